@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -147,6 +148,51 @@ def test_recoils_own_logs_may_lie_beside_them(tmp_path: Path) -> None:
     assert (logs.problems, len(logs.trials), len(logs.ratings)) == ((), 120, 3)
 
 
+def _by_pattern(pattern: str, *more: str) -> str:
+    """The example's map with a pattern for the code, and more lines."""
+    text = EXAMPLE.read_text(encoding="utf-8")
+    named = text.replace('column = "participant"', f'column = "participant"\npattern = {json.dumps(pattern)}', 1)
+    return "\n".join([named, *more])
+
+
+def test_a_pattern_takes_the_code_out_of_the_column(tmp_path: Path) -> None:
+    rows = [row for number in (1, 12) for row in _psychopy(trial_rows(f"VP_{number:02d}", number))]
+    logs = _read(_write(tmp_path / "all.csv", rows), _by_pattern(r"VP_(\d+)"))
+    assert (logs.problems, set(logs.trials["participant_id"])) == ((), {"01", "12"})
+
+
+def test_who_does_not_fit_the_pattern_is_named_in_the_map(tmp_path: Path) -> None:
+    rows = [row for code in ("VP_01", "guest") for row in _psychopy(trial_rows(code))]
+    path = _write(tmp_path / "all.csv", rows)
+    (problem,) = _read(path, _by_pattern(r"VP_(\d+)")).problems
+    assert "'guest' has no participant's code" in str(problem)
+    assert "[values.participant]" in str(problem)
+    logs = _read(path, _by_pattern(r"VP_(\d+)", "[values.participant]", 'guest = "G1"'))
+    assert (logs.problems, set(logs.trials["participant_id"])) == ((), {"01", "G1"})
+
+
+def test_a_pattern_that_makes_one_code_of_two_people_is_refused(tmp_path: Path) -> None:
+    rows = [row for code in ("A_01", "B_01", "A_02") for row in _psychopy(trial_rows(code))]
+    logs = _read(_write(tmp_path / "all.csv", rows), _by_pattern(r"_(\d+)"))
+    assert set(logs.trials["participant_id"]) == {"02"}
+    assert "'A_01' and 'B_01' are both code '01'" in str(logs.problems[0])
+
+
+@pytest.mark.parametrize(
+    ("code", "pattern"), [("VP_01", r"VP_(\d+)"), ("S-3", r"S\-(\d+)"), ("anna.b", r"anna\.([A-Za-z0-9]+)")]
+)
+def test_a_code_that_is_none_is_refused_with_both_remedies_and_both_help(
+    code: str, pattern: str, tmp_path: Path
+) -> None:
+    path = _write(tmp_path / "all.csv", _psychopy(trial_rows(code)))
+    (problem,) = _read(path).problems
+    assert f"{code!r} is not a code" in str(problem)
+    assert f"[participant] pattern = '{pattern}'" in str(problem)
+    assert f'[values.participant] {code!r} = "P01"' in str(problem)
+    for text in (_by_pattern(pattern), _by_pattern(r"^(\w+)$", "[values.participant]", f"'{code}' = \"P01\"")):
+        assert _read(path, text).problems == ()
+
+
 FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     "unknown key": (lambda t: t.replace("delimiter =", "separator ="), "text.separator = ',': unknown key"),
     "no experiment": (lambda t: t.replace('experiment = "direction"', ""), "experiment: is missing"),
@@ -157,6 +203,8 @@ FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     "decimal": (lambda t: t.replace('decimal = "."', 'decimal = ","'), "is also text.delimiter"),
     "both": (lambda t: t.replace("# file_name", "file_name"), "either `column` or `file_name`"),
     "pattern": (lambda t: t.replace('column = "participant"', 'file_name = "P.."'), "has 0 groups"),
+    "pattern of a name": (lambda t: t.replace('column = "participant"', 'file_name = "P(..)"\npattern = "P(..)"'),
+                          "`pattern` goes with `column`"),
     "skip": (lambda t: t.replace("empty = true", ""), "give `values`, or `empty = true`"),
     "not TOML": (lambda t: t + "[", "not TOML"),
 }  # fmt: skip

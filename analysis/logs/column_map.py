@@ -5,7 +5,8 @@ So the same rules check them. `configs/examples/columns.toml` shows every key. W
 - `experiment`, `files_end_with`, `gun`, `response_source`: of which experiment the logs are, which files of a folder
   are read, what rendered the stimuli and whose hand answered;
 - `[text]`: `delimiter`, `encoding`, `decimal` mark, and which cells are `missing`;
-- `[participant]`: the `column` with the code, or `file_name`, a pattern whose one group is the code;
+- `[participant]`: the `column` with the code, with a `pattern` if only a part of it is the code (its one group), or
+  `file_name`, such a pattern for the name of the file;
 - `[columns]`: for `method`, `direction`, `response`, `rating`, ... the name of the column that holds it. Without
   `session` a session is all trials with one method, without `trial` they are numbered in the order of rows;
   `instruction` is what the participant was told, as speed or accuracy; `correct`, where the other program said so, is
@@ -33,6 +34,7 @@ from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
 from experiments.design.language import NumberScale
 from experiments.record import tables
+from experiments.study.folders import is_code
 from experiments.tasks.questions import on_scale
 
 ShortText = Annotated[str, Field(min_length=1, max_length=500)]
@@ -57,15 +59,18 @@ class TextFormat(Model):
 
 
 class ParticipantMapping(Model):
-    """Where the participant's code stands."""
+    """Where the participant's code stands: in a column, all of it or the one group of a pattern, or in file names."""
 
     column: ShortText | None = None
-    file_name: Annotated[Pattern, Field(min_length=1), AfterValidator(_with_one_group)] | None = None
+    pattern: Annotated[ShortText, AfterValidator(_with_one_group)] | None = None
+    file_name: Annotated[ShortText, AfterValidator(_with_one_group)] | None = None
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.column is None) == (self.file_name is None):
             raise ValueError("give either `column` or `file_name`, not both and not none")
+        if self.pattern is not None and self.column is None:
+            raise ValueError("`pattern` goes with `column`; `file_name` is a pattern itself")
         return self
 
 
@@ -264,19 +269,53 @@ def _check_header(header: list[str], mapping: ColumnMap) -> None:
 
 
 def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
-    if mapping.participant.column is not None:
-        code = line.cells[mapping.participant.column]
-    else:
-        found = group_in(file_name, mapping.participant.file_name or "()")
-        if not found:
-            rule = f"(rule: participant.file_name = {mapping.participant.file_name!r} finds it)"
+    where, known = mapping.participant, mapping.values.participant
+    if where.column is None:
+        code = _group(where.file_name or "", file_name)
+        if code is None:
+            rule = f"(rule: participant.file_name = {where.file_name!r} finds it)"
             raise BadLogError(f"the name has no participant's code {rule}")
-        code = found
-    return mapping.values.participant.get(code, code)
+        return known.get(code, code)
+    cell = line.cells[where.column]
+    code = cell if where.pattern is None or cell in known else _group(where.pattern, cell)
+    if code is None:
+        rule = f"(rule: participant.pattern = {where.pattern!r} finds it; [values.participant] names who does not fit)"
+        raise BadLogError(f"{cell!r} has no participant's code {rule}", line.number, where.column)
+    return known.get(code, code)
+
+
+def _group(pattern: str, text: str) -> str | None:
+    """What the one group of a pattern finds in a text."""
+    match = re.search(pattern, text)
+    return None if match is None else match[1]
+
+
+def _check_person(code: str, lines: Sequence[_Line], where: ParticipantMapping) -> None:
+    """`BadLogError` if a code is none, or if a pattern makes one code of several people."""
+    first = lines[0].number
+    if not is_code(code):
+        raise BadLogError(
+            f"{code!r} is not a code (rule: 1 to 32 letters or digits); {_remedy(code)}", first, where.column
+        )
+    if where.column is None or where.pattern is None:
+        return
+    cells = list(dict.fromkeys(line.cells[where.column] for line in lines))
+    if len(cells) > 1:
+        message = f"{cells[0]!r} and {cells[1]!r} are both code {code!r} by participant.pattern = {where.pattern!r}"
+        raise BadLogError(f"{message} (rule: one code a participant)", first, where.column)
+
+
+def _remedy(code: str) -> str:
+    """How a map makes a code of a text that is none."""
+    parts = re.search(r"^(.*?)([0-9]+|[A-Za-z0-9]+)$", code)
+    start, kind = (parts[1], r"\d" if parts[2].isdecimal() else "[A-Za-z0-9]") if parts else ("", "[A-Za-z0-9]")
+    pattern = f"[participant] pattern = '{re.escape(start)}({kind}+)'"
+    return f'{pattern} takes a part of it for the code, [values.participant] {code!r} = "P01" gives another one'
 
 
 def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
+    _check_person(code, lines, mapping.participant)
     make = _rating if tables.is_rated(mapping.experiment) else _trial
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
     if tables.is_rated(mapping.experiment) and mapping.columns.trial is None:
