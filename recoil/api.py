@@ -27,8 +27,9 @@ def load_config(name: str | Path) -> Setup[DesignConfig]:
     ('vibration', 'asymmetric-1', 'asymmetric-2')
     """
     from experiments.load import load_setup
+    from recoil.arguments import file_or_name
 
-    return load_setup(str(name))
+    return load_setup(file_or_name("name", name))
 
 
 def plan(setup: Setup[DesignConfig], participant: str = "P01", seed: int = 1, order_row: int | None = None) -> Plan:
@@ -43,7 +44,11 @@ def plan(setup: Setup[DesignConfig], participant: str = "P01", seed: int = 1, or
     from experiments.design.planning import plan_of
     from experiments.design.streams import checked_seed
     from experiments.study.folders import check_code
+    from recoil.arguments import check_setup, refusal
 
+    check_setup("setup", setup)
+    if not isinstance(participant, str):
+        raise refusal("participant", participant, "a code, such as 'P01'")
     check_code(participant)
     checked_seed(seed)
     return plan_of(setup.config, participant, seed, row=order_row)
@@ -60,46 +65,62 @@ def run_synthetic(
     ['sub-P01_task-preference_ratings.csv']
     """
     from experiments.clock import VirtualClock
-    from experiments.config.door import ConfigError
     from experiments.run import RunRequest, run
     from experiments.screens.synthetic import synthetic_screen
+    from recoil.arguments import arguments_named, check_setup, path_of, texts_of
 
-    if isinstance(participants, str):
-        raise ConfigError(f"participants = {participants!r}: must be a list of codes, such as [{participants!r}]")
-    requests = (RunRequest(setup=setup, participant_id=code, results=Path(results), seed=seed) for code in participants)
-    return [run(request, synthetic_screen, VirtualClock()).place.table for request in requests]
+    check_setup("setup", setup)
+    codes, where = texts_of("participants", participants, "codes", "P01"), path_of("results", results)
+    requests = (RunRequest(setup=setup, participant_id=code, results=where, seed=seed) for code in codes)
+    with arguments_named():
+        return [run(request, synthetic_screen, VirtualClock()).place.table for request in requests]
 
 
-def read_logs(*paths: str | Path) -> Logs:
+def read_logs(*paths: str | Path, columns: str | Path | None = None, include_synthetic: bool = False) -> Logs:
     """The logs in files and folders: `trials` and `ratings` as DataFrames, and `problems`: what was left out, and why.
 
-    `RecoilError` if there is nothing that can be used.
+    `columns` is the file of a map for logs that Recoil did not write (`configs/examples/columns.toml`). All rows are of
+    one `kind`: of people at a gun, of people at a simulated gun, or of synthetic participants. Logs of other kinds are
+    problems; with `include_synthetic` they are logs of their own, `apart`. `RecoilError` if there is nothing that can
+    be used.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     tables = run_synthetic(load_config("direction"), ["P01"], folder, seed=1)
     ...     logs = read_logs(folder)
-    >>> len(logs.trials), logs.problems
-    (60, ())
+    >>> len(logs.trials), logs.kind, logs.problems
+    (60, 'synthetic', ())
     """
-    from analysis.logs.reading import read_logs as reading
-    from experiments.config.door import ConfigError
+    from dataclasses import replace
 
-    if not paths or not all(isinstance(path, str | Path) and str(path) for path in paths):
-        raise ConfigError(f"paths = {paths!r}: must be files or folders with logs, one argument each")
-    logs = reading(paths)
+    from analysis.logs.column_map import ColumnMap
+    from analysis.logs.reading import read_logs as reading
+    from experiments.config.door import ConfigError, load
+    from recoil.arguments import in_python, path_of, paths_of
+
+    found = paths_of("paths", paths)
+    mapping = None if columns is None else load(ColumnMap, path_of("columns", columns))
+    logs = reading(found, mapping=mapping, include_synthetic=include_synthetic)
+    logs = replace(logs, problems=tuple(replace(one, message=in_python(one.message)) for one in logs.problems))
     if not logs.files:
         nothing = (f"{', '.join(map(str, paths))}: no logs of Recoil",)
         raise ConfigError("\n".join(map(str, (*logs.problems, *logs.begun) or nothing)))
     return logs
 
 
-def analyze(*paths: str | Path, requests: str | Path | None = None, fits: bool = False) -> StudyStatistics:
+def analyze(
+    *paths: str | Path,
+    columns: str | Path | None = None,
+    include_synthetic: bool = False,
+    requests: str | Path | None = None,
+    fits: bool = False,
+) -> StudyStatistics:
     """The statistics of all logs in files and folders; `to_frame()`, `to_dict()`, and a table in a notebook.
 
-    `requests`: a file of further tests and models (`examples/requests.toml`), whose answers are `requested`.
-    `fits`: with the diffusion model fitted. Who was left out stands in `excluded`, and what there is to say in
-    `warnings`. `RecoilError` if there is nothing that can be used.
+    `columns` and `include_synthetic` are those of `read_logs`: statistics of other kinds of data than `data_kind` are
+    `kept_apart`. `requests`: a file of further tests and models (`examples/requests.toml`), whose answers are
+    `requested`. `fits`: with the diffusion model fitted. Who was left out stands in `excluded`, and what there is to
+    say in `warnings`. `RecoilError` if there is nothing that can be used.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -115,12 +136,13 @@ def analyze(*paths: str | Path, requests: str | Path | None = None, fits: bool =
     from analysis.summary.requests import Requests
     from analysis.summary.summary import summarize
     from experiments.config.door import load
+    from recoil.arguments import path_of
 
-    asked = load(Requests, Path(requests)) if requests is not None else None
-    logs = read_logs(*paths)
+    asked = load(Requests, path_of("requests", requests)) if requests is not None else None
+    logs = read_logs(*paths, columns=columns, include_synthetic=include_synthetic)
     found = with_everybody(summarize(logs, fits=fits), logs)
     if asked is not None and requests is not None:
-        found = replace(found, requested=answers_to(asked, Path(requests), logs))
+        found = replace(found, requested=answers_to(asked, Path(requests), replace(logs, apart=())))
     left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
     return replace(found, warnings=(*left_out, *map(str, logs.remarks), *found.warnings))
 
@@ -133,8 +155,9 @@ def audit(paper: str | Path = "paper") -> Audited:
     ('14 participants (7 males and 7 females)', 'attainable')
     """
     from analysis.paper.audit.run import audit_file
+    from recoil.arguments import file_or_name
 
-    return audit_file(str(paper))
+    return audit_file(file_or_name("paper", paper))
 
 
 def power(
@@ -158,26 +181,22 @@ def power(
     """
     from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.run import simulated_power
-    from experiments.config.door import ConfigError
     from experiments.design.streams import checked_seed
+    from recoil.arguments import arguments_named, file_or_name, numbers_of, refusal, texts_of
 
     if isinstance(studies, bool) or not isinstance(studies, int) or studies < 1:
-        raise ConfigError(f"studies = {studies!r}: must be a whole number from 1, such as 10_000")
+        raise refusal("studies", studies, "a whole number from 1, such as 10_000")
+    if isinstance(target, bool) or not isinstance(target, int | float):
+        raise refusal("target", target, "a number between 0 and 1, such as 0.8")
     request = PowerRequest(
-        config=str(config),
-        participants=_listed(participants),
-        trials=_listed(trials),
-        effects=_listed(effects),
-        methods=tuple(methods),
+        config=file_or_name("config", config),
+        participants=numbers_of("participants", participants),
+        trials=numbers_of("trials", trials),
+        effects=numbers_of("effects", effects),
+        methods=texts_of("methods", methods, "names", "vibration"),
         studies=studies,
         target=target,
         seed=checked_seed(seed),
     )
-    return simulated_power(request)
-
-
-def _listed(values: str | float | Sequence[float]) -> str | None:
-    """Numbers as the command line takes them; `None` for none."""
-    if isinstance(values, str | int | float):
-        return str(values)
-    return ",".join(map(str, values)) or None
+    with arguments_named():
+        return simulated_power(request)

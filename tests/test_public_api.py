@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import shutil
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import recoil
@@ -28,6 +30,21 @@ def test_every_public_name_is_there_and_says_what_it_is() -> None:
     assert dir(recoil) == recoil.__all__
     for name in recoil.__all__:
         assert getattr(recoil, name).__doc__
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in recoil.__all__ if not name.startswith("__")])
+def test_every_public_name_has_an_example_that_runs(name: str) -> None:
+    public = getattr(recoil, name)
+    found = doctest.DocTestFinder(recurse=False).find(public, name, globs=vars(sys.modules[public.__module__]))
+    assert [one.examples for one in found] not in ([], [[]])
+    for one in found:
+        assert doctest.DocTestRunner().run(one).failed == 0
+
+
+def test_numbers_may_come_as_arrays() -> None:
+    found = recoil.power("preference", participants=np.arange(8, 10), effects=np.float64(1), studies=5)  # type: ignore[arg-type]
+    assert {design.participants for design in found.designs} == {8, 9}
 
 
 def test_an_unknown_name_is_refused_with_those_there_are() -> None:
@@ -85,6 +102,24 @@ def test_what_found_is_shown_in_a_notebook() -> None:
         (lambda _, __: recoil.analyze(""), "must be files or folders with logs"),
         (lambda _, __: recoil.read_logs(None), "must be files or folders with logs"),
         (lambda _, __: recoil.power("preference", studies=0), "studies = 0: must be a whole number from 1"),
+        (lambda _, __: recoil.load_config(5), "name = 5: must be a file or the name of a shipped config"),
+        (lambda _, __: recoil.plan("direction"), "setup = 'direction': must be what load_config gives"),
+        (lambda setup, _: recoil.plan(setup, participant=5), "participant = 5: must be a code, such as 'P01'"),
+        (lambda _, folder: recoil.run_synthetic("direction", ["P01"], folder), "setup = 'direction': must be what"),
+        (lambda setup, folder: recoil.run_synthetic(setup, [1], folder), "participants = [1]: must be a list of codes"),
+        (lambda setup, _: recoil.run_synthetic(setup, ["P01"], 5), "results = 5: must be a path"),
+        (lambda _, __: recoil.read_logs("x", columns=5), "columns = 5: must be a path"),
+        (lambda _, __: recoil.analyze("x", columns="none.toml"), "none.toml"),
+        (lambda _, __: recoil.audit(5), "paper = 5: must be a file"),
+        (lambda _, __: recoil.power(5), "config = 5: must be a file"),
+        (lambda _, __: recoil.power("preference", participants="abc"), "participants = abc: 'abc' is no whole number"),
+        (lambda _, __: recoil.power("preference", participants=None), "participants = None: must be a number, a list"),
+        (lambda _, __: recoil.power("preference", trials=-1), "trials = -1: "),
+        (lambda _, __: recoil.power("preference", effects="x"), "effects = x: 'x' must be a number"),
+        (lambda _, __: recoil.power("preference", methods="ramp"), "methods = 'ramp': must be a list of names"),
+        (lambda _, __: recoil.power("preference", methods=["x"]), "methods = x: must be two or more"),
+        (lambda _, __: recoil.power("preference", target="x"), "target = 'x': must be a number between 0 and 1"),
+        (lambda _, __: recoil.power("preference", target=2), "target = 2: must lie between 0 and 1"),
     ],
 )
 def test_what_cannot_be_is_one_message_and_leaves_nothing(call: Any, said: str, tmp_path: Path) -> None:

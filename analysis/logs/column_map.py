@@ -29,7 +29,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.files import BadLogError
-from analysis.logs.patterns import Pattern, group_in, groups_in
+from analysis.logs.patterns import groups_in
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
 from experiments.design.language import NumberScale

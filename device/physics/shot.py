@@ -244,12 +244,14 @@ _numbers = attrgetter(*_NAMES)
 
 
 def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
-    """The summary of one shot from rest. `ValueError`: no such fidelity.
+    """The summary of one shot from rest. `ValueError`: no such fidelity; `TypeError`: no parameters of a gun.
 
     >>> shot = simulate(GunParameters(friction_N=1.12))
     >>> shot.status, round(shot.peak_force_N, 2), round(shot.reset_end_s, 3)
     ('home', 35.14, 0.211)
     """
+    if not isinstance(parameters, GunParameters):
+        raise TypeError(f"parameters is {parameters!r}; it must be GunParameters, such as GunParameters(voltage_V=20)")
     return summary_from(_numbers(interpret(pack(parameters, model_number(fidelity)))))
 
 

@@ -1,0 +1,100 @@
+"""What a notebook's arguments have to be: each error names the argument, its value and the rule."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from numbers import Real
+from pathlib import Path
+
+from device.words import RecoilError
+from experiments.config.door import ConfigError
+from experiments.config.setup import Setup
+
+_LONGEST = 80
+_OF_OPTIONS = {"include-synthetic": "include_synthetic=True", "effect": "effects"}
+"""What options are called in Python, where it is not the same."""
+_OPTION = re.compile(r"--([a-z][a-z-]*)( \S+:)?")
+
+
+def refusal(name: str, value: object, must: str) -> ConfigError:
+    """The error for an argument that cannot be.
+
+    >>> str(refusal("target", "high", "a number, such as 0.8"))
+    "target = 'high': must be a number, such as 0.8"
+    """
+    shown = repr(value)
+    return ConfigError(f"{name} = {shown if len(shown) <= _LONGEST else shown[:_LONGEST] + '...'}: must be {must}")
+
+
+def file_or_name(name: str, value: object) -> str:
+    """A file, or the name of a shipped config."""
+    if not isinstance(value, str | Path) or not str(value):
+        raise refusal(name, value, "a file or the name of a shipped config, such as 'direction'")
+    return str(value)
+
+
+def path_of(name: str, value: object) -> Path:
+    """A file or folder."""
+    if not isinstance(value, str | Path) or not str(value):
+        raise refusal(name, value, "a path, such as 'results'")
+    return Path(value)
+
+
+def paths_of(name: str, values: Sequence[object]) -> tuple[Path, ...]:
+    """One or more files or folders."""
+    if not values or not all(isinstance(path, str | Path) and str(path) for path in values):
+        raise refusal(name, values, "files or folders with logs, one argument each")
+    return tuple(Path(str(path)) for path in values)
+
+
+def check_setup(name: str, value: object) -> None:
+    """`ConfigError` for what is no loaded config."""
+    if not isinstance(value, Setup):
+        raise refusal(name, value, "what load_config gives, such as load_config('direction')")
+
+
+def texts_of(name: str, values: object, what: str, example: str) -> tuple[str, ...]:
+    """A list of texts; one text alone is none."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        shown = values if isinstance(values, str) and values else example
+        raise refusal(name, values, f"a list of {what}, such as [{shown!r}]")
+    found = tuple(values)
+    if not all(isinstance(one, str) for one in found):
+        raise refusal(name, values, f"a list of {what}, such as [{example!r}]")
+    return found
+
+
+def numbers_of(name: str, values: object) -> str | None:
+    """Numbers as the command line takes them; `None` for none."""
+    if isinstance(values, bool) or not isinstance(values, str | Real | Iterable):
+        raise refusal(name, values, "a number, a list of numbers, or text such as '8,10,14-20'")
+    if isinstance(values, str | Real):
+        return str(values)
+    return ",".join(map(str, values)) or None
+
+
+def in_python(message: str) -> str:
+    """A message whose options are called as the arguments are.
+
+    >>> in_python("--participants abc: is no number; give --include-synthetic")
+    'participants = abc: is no number; give include_synthetic=True'
+    """
+
+    def named(option: re.Match[str]) -> str:
+        name = _OF_OPTIONS.get(option[1], option[1].replace("-", "_"))
+        return name if option[2] is None else f"{name} ={option[2]}"
+
+    return _OPTION.sub(named, message)
+
+
+@contextmanager
+def arguments_named() -> Iterator[None]:
+    """Have errors of commands speak of arguments instead of options."""
+    try:
+        yield
+    except RecoilError as error:
+        if "--" not in str(error):
+            raise
+        raise ConfigError(in_python(str(error))) from error
