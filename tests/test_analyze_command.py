@@ -117,7 +117,7 @@ def test_rules_and_what_they_left_out_stand_in_the_statistics_and_the_report(rec
     excluded = [tuple(one.values())[:4] for one in found["excluded"]]
     assert ("direction", "P04", "fell ill", "excluded") in excluded
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "Participant P04 in direction recognition: fell ill." in report
+    assert "- Direction recognition: 1 participant left out: P04 (fell ill)." in report
     assert "drop_flags 1" in report.replace("\\", "")
 
 

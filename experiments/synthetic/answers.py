@@ -319,8 +319,8 @@ def _drawn(weights: Sequence[float], draws: Stream) -> int:
 
 def _number(trial: Trial, factor: str) -> float:
     level = trial.level(factor)
-    if not isinstance(level, float) or level <= 0:
-        raise ConfigError(f"{factor} = {level!r}: this law needs a number above 0")
+    if not isinstance(level, float) or level < 0:
+        raise ConfigError(f"{factor} = {level!r}: this law needs a number from 0")
     return level
 
 
