@@ -70,7 +70,8 @@ def _facts(values: Mapping[str, object]) -> Facts:
 def study(folder: Path, change: StudyChange | None) -> tuple[StudyStatus, tuple[str, ...]]:
     """How a folder's study stands after a change, and what there is to say of the change. Errors name what to do."""
     where = open_study(folder)
-    notes = _carry_out(where, change) if change else ()
+    shipped = f"{folder}: no study.toml here or in the folder above; shown by the study that comes with Recoil"
+    notes = (*((shipped,) if where.is_shipped else ()), *(_carry_out(where, change) if change else ()))
     return StudyStatus(study=where, overview=overview(where)), notes
 
 

@@ -251,6 +251,13 @@ def test_configs_are_copied_once_and_never_over_others(recoil: Recoil, tmp_path:
     refused(recoil("configs", "--copy", "mine"), "already there")
 
 
+def test_files_that_are_made_are_listed_for_programs(recoil: Recoil, tmp_path: Path) -> None:
+    for words in (("configs",), ("configs", "--copy", "mine"), ("configs", "--schema", "schemas"), ("new", "pilot")):
+        files = json.loads(recoil(*words, "--json").stdout)["files"]
+        assert files
+        assert all((tmp_path / file).exists() for file in files)
+
+
 def test_a_new_study_can_be_changed_and_run(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("new", "pilot").returncode == 0
     config = tmp_path / "pilot" / "direction.toml"

@@ -202,6 +202,9 @@ def test_a_study_that_the_published_numbers_do_not_fit_is_that_of_its_configs(tm
     asked = warm("reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed")
     refused = subprocess.run(asked, check=False, capture_output=True, text=True)
     assert (refused.returncode, "the study has 2 participants" in refused.stderr) == (2, True)
+    told = warm("reproduce", "--study", study, "--out", study)
+    done = subprocess.run(told, check=False, capture_output=True, text=True)
+    assert done.stderr.startswith("recoil: The participants are those of the configs: the study has 2 participants")
 
 
 def test_a_strangers_folder_is_refused(tmp_path: Path) -> None:

@@ -119,6 +119,15 @@ def test_a_results_folder_is_its_studys_and_without_one_the_shipped_studys(recoi
     assert told(recoil, folder="pilot/results") == told(recoil)
     assert told(recoil, folder="elsewhere")["planned_participants"] == 14
     assert states(told(recoil, folder="elsewhere")) == {"P01": ["done", "not begun"]}
+    assert "elsewhere: no study.toml here or in the folder above" in recoil("study", "elsewhere").stderr
+
+
+def test_other_results_beside_a_studys_file_are_its_own(recoil: Recoil, pilot: Path) -> None:
+    config = pilot / "study.toml"
+    config.write_text(config.read_text().replace("participants = 14", "participants = 3"))
+    do(pilot, "P01", results=pilot / "simulated")
+    assert told(recoil, folder="pilot/simulated")["planned_participants"] == 3
+    assert recoil("study", "pilot/simulated").stderr == ""
 
 
 def test_a_study_ends_when_its_participants_are_done(recoil: Recoil, pilot: Path) -> None:

@@ -20,7 +20,7 @@ from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig
 from experiments.design.planned import order_shown
-from experiments.load import load_setup, load_study
+from experiments.load import load_setup, load_study, shipped_folder
 from experiments.rebuild import began_with
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
@@ -139,6 +139,12 @@ class StudyFolder:
     results: Path
 
     @property
+    def is_shipped(self) -> bool:
+        """Whether it is the study that comes with Recoil, for want of one that the results belong to."""
+        own = self.source.parent.resolve()
+        return own == shipped_folder().resolve() != self.results.resolve().parent
+
+    @property
     def experiments(self) -> tuple[str, ...]:
         """The experiments in the order of the study."""
         return tuple(setup.config.experiment for setup in self.setups)
@@ -161,17 +167,18 @@ class Overview:
 def open_study(folder: Path) -> StudyFolder:
     """The study of a folder: one with `study.toml`, or a results folder, which belongs to the study it lies in.
 
-    A results folder without a study is taken for one of the shipped study. `PlaceError` for any other folder,
-    `ConfigError` for a broken config.
+    A results folder without a study is taken for one of the shipped study, which `is_shipped` then says. `PlaceError`
+    for any other folder, `ConfigError` for a broken config.
     """
     if not folder.is_dir():
         raise PlaceError(f"{folder}: no such folder; name a study's folder or a results folder")
     if (folder / "study.toml").is_file():
         return _loaded(str(folder / "study.toml"), folder / "results")
     beside = Path(os.path.normpath(folder / ".." / "study.toml"))
-    if folder.resolve().name == "results" and beside.is_file():
+    has_runs = (folder / register.REGISTER_FILE).exists() or known_codes(folder, register.read_register(folder))
+    if beside.is_file() and (has_runs or folder.resolve().name == "results"):
         return _loaded(str(beside), folder)
-    if not ((folder / register.REGISTER_FILE).exists() or known_codes(folder, register.read_register(folder))):
+    if not has_runs:
         raise PlaceError(
             f"{folder}: neither a study's folder (study.toml) nor a results folder "
             f"(sub-CODE or {register.REGISTER_FILE}); `recoil new STUDY` makes one"

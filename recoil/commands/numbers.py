@@ -45,6 +45,8 @@ def reproduce(
     from analysis.predict.reproduction import reproduce as feature
 
     loaded = feature.prepared(study, seed, observer.value if observer else None)
+    if not loaded.reconstructed and observer is None:
+        say("\n".join(f"recoil: {note}" for note in loaded.notes))
     with progress("reproduce", len(loaded.runs) + 3) as tell:
         done = feature.reproduce(loaded, out, tell)
     show(done.statistics, f"{feature.comparison_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)

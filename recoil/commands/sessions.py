@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -150,6 +150,7 @@ def configs(
     schema: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write a JSON Schema of each kind of config, for editors.")
     ] = None,
+    as_json: AsJsonOption = False,
 ) -> None:
     """List the shipped configs, copy them to edit, give back those that a run began with, or write their schemas."""
     from recoil.config_files import copy_began_with, copy_configs, shipped, write_schemas
@@ -157,12 +158,16 @@ def configs(
     if schema is not None:
         if copy is not None or journal is not None:
             raise typer.BadParameter("--schema stands alone: it copies no configs")
-        sys.stdout.write("".join(f"{path}\n" for path in write_schemas(schema)))
+        _list_files(write_schemas(schema), as_json)
         return
     if journal is not None and copy is None:
         raise typer.BadParameter("--from goes with --copy DIR, the folder that the files are written to")
     paths = shipped() if copy is None else copy_began_with(journal, copy) if journal else copy_configs(copy)
-    sys.stdout.write("".join(f"{path}\n" for path in paths))
+    _list_files(paths, as_json)
+
+
+def _list_files(paths: Sequence[Path], as_json: bool) -> None:
+    show({"files": [str(path) for path in paths]}, "\n".join(map(str, paths)), as_json)
 
 
 def new(
@@ -171,8 +176,9 @@ def new(
         str, typer.Option("--from", metavar="NAME", help="A shipped design to start from; without: the paper's study.")
     ] = "",
     paper: Annotated[bool, typer.Option("--paper", help="With --from: the paper's numbers beside it.")] = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Make a study's folder from a template, or from a shipped design."""
     from recoil.config_files import new_study
 
-    sys.stdout.write("".join(f"{path}\n" for path in new_study(study, design, paper=paper)))
+    _list_files(new_study(study, design, paper=paper), as_json)
