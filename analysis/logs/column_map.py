@@ -26,27 +26,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from analysis.logs.files import BadLogError
-from analysis.logs.patterns import groups_in
+from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model
 from experiments.design.language import NumberScale
 from experiments.record import tables
-from experiments.study.folders import is_code
 from experiments.tasks.questions import on_scale
 
-ShortText = Annotated[str, Field(min_length=1, max_length=500)]
 MEASURES = {"direction": ("method", "direction", "response"), "preference": ("method", "rating")}
 """The columns without which there is nothing to analyse."""
-
-
-def _with_one_group(pattern: str) -> str:
-    groups = groups_in(pattern)
-    if groups != 1:
-        raise ValueError(f"has {groups} groups; it must have one, which is the code")
-    return pattern
 
 
 class TextFormat(Model):
@@ -56,22 +47,6 @@ class TextFormat(Model):
     encoding: Literal["utf-8", "utf-8-sig", "cp1252", "latin-1", "utf-16"] = "utf-8-sig"
     decimal: Literal[".", ","] = "."
     missing: tuple[str, ...] = ("", "None", "NA", "nan")
-
-
-class ParticipantMapping(Model):
-    """Where the participant's code stands: in a column, all of it or the one group of a pattern, or in file names."""
-
-    column: ShortText | None = None
-    pattern: Annotated[ShortText, AfterValidator(_with_one_group)] | None = None
-    file_name: Annotated[ShortText, AfterValidator(_with_one_group)] | None = None
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if (self.column is None) == (self.file_name is None):
-            raise ValueError("give either `column` or `file_name`, not both and not none")
-        if self.pattern is not None and self.column is None:
-            raise ValueError("`pattern` goes with `column`; `file_name` is a pattern itself")
-        return self
 
 
 class ColumnNames(Model):
@@ -200,7 +175,7 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
     people: dict[tuple[str | None, str], list[_Line]] = {}
     for line in lines:
         study = line.cells[mapping.columns.study] if mapping.columns.study else None
-        people.setdefault((study, _participant(line, file_name, mapping)), []).append(line)
+        people.setdefault((study, _code(line, file_name, mapping)), []).append(line)
     if not people:
         raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
     return [
@@ -212,6 +187,13 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
         )
         for (study, code), group in people.items()
     ]
+
+
+def _code(line: _Line, file_name: str, mapping: ColumnMap) -> str:
+    """The participant of a row."""
+    column = mapping.participant.column
+    text = file_name if column is None else line.cells[column]
+    return code_in(text, mapping.participant, mapping.values.participant, line.number)
 
 
 def is_recoils(content: bytes) -> bool:
@@ -268,54 +250,10 @@ def _check_header(header: list[str], mapping: ColumnMap) -> None:
             raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
 
 
-def _participant(line: _Line, file_name: str, mapping: ColumnMap) -> str:
-    where, known = mapping.participant, mapping.values.participant
-    if where.column is None:
-        code = _group(where.file_name or "", file_name)
-        if code is None:
-            rule = f"(rule: participant.file_name = {where.file_name!r} finds it)"
-            raise BadLogError(f"the name has no participant's code {rule}")
-        return known.get(code, code)
-    cell = line.cells[where.column]
-    code = cell if where.pattern is None or cell in known else _group(where.pattern, cell)
-    if code is None:
-        rule = f"(rule: participant.pattern = {where.pattern!r} finds it; [values.participant] names who does not fit)"
-        raise BadLogError(f"{cell!r} has no participant's code {rule}", line.number, where.column)
-    return known.get(code, code)
-
-
-def _group(pattern: str, text: str) -> str | None:
-    """What the one group of a pattern finds in a text."""
-    match = re.search(pattern, text)
-    return None if match is None else match[1]
-
-
-def _check_person(code: str, lines: Sequence[_Line], where: ParticipantMapping) -> None:
-    """`BadLogError` if a code is none, or if a pattern makes one code of several people."""
-    first = lines[0].number
-    if not is_code(code):
-        raise BadLogError(
-            f"{code!r} is not a code (rule: 1 to 32 letters or digits); {_remedy(code)}", first, where.column
-        )
-    if where.column is None or where.pattern is None:
-        return
-    cells = list(dict.fromkeys(line.cells[where.column] for line in lines))
-    if len(cells) > 1:
-        message = f"{cells[0]!r} and {cells[1]!r} are both code {code!r} by participant.pattern = {where.pattern!r}"
-        raise BadLogError(f"{message} (rule: one code a participant)", first, where.column)
-
-
-def _remedy(code: str) -> str:
-    """How a map makes a code of a text that is none."""
-    parts = re.search(r"^(.*?)([0-9]+|[A-Za-z0-9]+)$", code)
-    start, kind = (parts[1], r"\d" if parts[2].isdecimal() else "[A-Za-z0-9]") if parts else ("", "[A-Za-z0-9]")
-    pattern = f"[participant] pattern = '{re.escape(start)}({kind}+)'"
-    return f'{pattern} takes a part of it for the code, [values.participant] {code!r} = "P01" gives another one'
-
-
 def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
-    _check_person(code, lines, mapping.participant)
+    column = mapping.participant.column
+    check_person(code, mapping.participant, lines[0].number, [line.cells[column] for line in lines] if column else ())
     make = _rating if tables.is_rated(mapping.experiment) else _trial
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
     if tables.is_rated(mapping.experiment) and mapping.columns.trial is None:

@@ -34,8 +34,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis.logs.column_map import ShortText
 from analysis.logs.files import Problem, below, names_below
+from analysis.logs.mapped_people import ShortText
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray

@@ -1,0 +1,86 @@
+"""Whose logs another program's rows are: a code in a column, a part of one, or a part of the file's name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from analysis.logs.files import BadLogError
+from analysis.logs.patterns import Pattern, group_in, groups_in
+from experiments.config.door import Model
+from experiments.study.folders import is_code
+
+ShortText = Annotated[str, Field(min_length=1, max_length=500)]
+
+
+def _with_one_group(pattern: str) -> str:
+    groups = groups_in(pattern)
+    if groups != 1:
+        raise ValueError(f"has {groups} groups; it must have one, which is the code")
+    return pattern
+
+
+_CodePattern = Annotated[Pattern, Field(min_length=1), AfterValidator(_with_one_group)]
+
+
+class ParticipantMapping(Model):
+    """Where the participant's code stands: in a column, all of it or the one group of a pattern, or in file names."""
+
+    column: ShortText | None = None
+    pattern: _CodePattern | None = None
+    file_name: _CodePattern | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.column is None) == (self.file_name is None):
+            raise ValueError("give either `column` or `file_name`, not both and not none")
+        if self.pattern is not None and self.column is None:
+            raise ValueError("`pattern` goes with `column`; `file_name` is a pattern itself")
+        return self
+
+
+def code_in(text: str, where: ParticipantMapping, known: Mapping[str, str], line: int) -> str:
+    """The code in a cell, or in a file's name; `known` are codes of the map's own. `BadLogError`: there is none."""
+    if where.column is None:
+        code = _group(where.file_name or "()", text)
+        if code is None:
+            rule = f"(rule: participant.file_name = {where.file_name!r} finds it)"
+            raise BadLogError(f"the name has no participant's code {rule}")
+        return known.get(code, code)
+    code = text if where.pattern is None or text in known else _group(where.pattern, text)
+    if code is None:
+        rule = f"(rule: participant.pattern = {where.pattern!r} finds it; [values.participant] names who does not fit)"
+        raise BadLogError(f"{text!r} has no participant's code {rule}", line, where.column)
+    return known.get(code, code)
+
+
+@lru_cache(maxsize=4096)
+def _group(pattern: str, text: str) -> str | None:
+    """What the one group of a pattern finds in a text, if it finds something; rows of one person say the same."""
+    return group_in(text, pattern) or None
+
+
+def check_person(code: str, where: ParticipantMapping, line: int, cells: Sequence[str]) -> None:
+    """`BadLogError` if a code is none, or if a pattern made it of several people's `cells`; `line` is their first."""
+    if not is_code(code):
+        rule = "(rule: 1 to 32 letters or digits)"
+        raise BadLogError(f"{code!r} is not a code {rule}; {_remedy(code, where)}", line, where.column)
+    several = list(dict.fromkeys(cells)) if where.pattern is not None else []
+    if len(several) > 1:
+        both = f"{several[0]!r} and {several[1]!r} are both code {code!r} by participant.pattern = {where.pattern!r}"
+        raise BadLogError(f"{both} (rule: one code a participant)", line, where.column)
+
+
+def _remedy(code: str, where: ParticipantMapping) -> str:
+    """How a map makes a code of a text that is none."""
+    listed = f'[values.participant] {code!r} = "P01" gives another one'
+    if where.file_name or where.pattern:
+        return f"let the pattern's group hold letters and digits alone, or {listed}"
+    parts = re.search(r"^(.*?)([0-9]+|[A-Za-z0-9]+)$", code)
+    start, kind = (parts[1], r"\d" if parts[2].isdecimal() else "[A-Za-z0-9]") if parts else ("", "[A-Za-z0-9]")
+    pattern = f"[participant] pattern = '{re.escape(start)}({kind}+)'"
+    return f"{pattern} takes a part of it for the code, {listed}"
