@@ -74,6 +74,6 @@ def folder_of(kind: DataKind) -> str:
 def kept_out(kind: DataKind, first: DataKind) -> str:
     """What is said of a log of another kind than the first."""
     return (
-        f"is of {OF_KIND[kind]}, beside logs of {OF_KIND[first]} (rule: never together); read its folder by itself, or "
-        "give --include-synthetic, which keeps both apart"
+        f"is of {OF_KIND[kind]}, beside logs of {OF_KIND[first]} (rule: never together); read it by itself, or with "
+        "`--include-synthetic`, which keeps both apart"
     )
