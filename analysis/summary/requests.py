@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from analysis.logs.column_map import ShortText
+from analysis.logs.mapped_people import ShortText
 from analysis.stats.anova_bayes import FIXED_SCALE, RANDOM_SCALE, AnovaBayesFactor, rm_anova_bayes_factor
 from analysis.stats.arrays import FloatArray
 from analysis.stats.contrasts import PlannedContrast, planned_contrasts
