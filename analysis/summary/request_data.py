@@ -13,7 +13,8 @@ from analysis.stats.cells import coded
 from analysis.summary.designs import question_scores
 from analysis.summary.requests import AnyRequest, RequestData, Requested, Requests, answer_to
 from analysis.summary.summary import methods_in
-from experiments.config.door import ConfigError, line_of, read_text
+from experiments.config.door import ConfigError, read_text
+from experiments.config.findings import line_of
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig, shown_level
 
