@@ -27,7 +27,7 @@ NODES = 25
 """As many as lme4 allows. Of people who differ by an SD above 3 (in log odds) they leave an error of 1 %; 99 do not."""
 LARGEST_SD = 10.0
 """Log odds that differ so much between people leave hardly anybody with answers of both kinds."""
-_STEPS, _CLOSE, _NEAR, _LONGEST = 100, 1e-9, 0.05, 2.0
+_STEPS, _CLOSE, _NEAR, _LONGEST = 100, 1e-8, 0.05, 2.0
 _SINGULAR, _FLAT = 1e-4, 1e-10
 """A spread between people below the first is none; a peak as flat in one direction as the second is none."""
 
@@ -177,9 +177,10 @@ def _fitted(
     theta, peak = _climbed(cells, start, np.polynomial.hermite.hermgauss(nodes))
     if abs(theta[-1]) > LARGEST_SD:
         return replace(empty, reason=RUNS_AWAY)
-    if peak is None:
+    covariance = None if peak is None else _covariance(theta, peak)
+    if peak is None or covariance is None:
         return replace(empty, reason=NOT_FOUND)
-    covariance = columns.back @ np.linalg.inv(-peak.hessian)[:-1, :-1] @ columns.back.T
+    covariance = columns.back @ covariance @ columns.back.T
     sd = abs(float(theta[-1]))
     return replace(
         empty,
@@ -201,10 +202,20 @@ def _climbed(cells: _Cells, start: FloatArray, rule: tuple[FloatArray, FloatArra
         theta = theta + step
         if abs(theta[-1]) > LARGEST_SD:
             return theta, None
-        if np.abs(step).max() < _CLOSE:
-            values = np.linalg.eigvalsh(-here.hessian)
-            return theta, here if values[0] > _FLAT * values[-1] else None
+        if np.abs(step if abs(theta[-1]) > _SINGULAR else step[:-1]).max() < _CLOSE:
+            return theta, here
     return theta, None
+
+
+def _covariance(theta: FloatArray, peak: _Peak) -> FloatArray | None:
+    """That of the coefficients; None where the likelihood is flat. With no spread its own direction does not count."""
+    own = slice(None) if abs(theta[-1]) > _SINGULAR else slice(-1)
+    bent = -peak.hessian[own, own]
+    values = np.linalg.eigvalsh(bent)
+    if values[0] <= _FLAT * values[-1]:
+        return None
+    covariance: FloatArray = np.linalg.inv(bent)[: theta.size - 1, : theta.size - 1]
+    return covariance
 
 
 def _upwards(
