@@ -46,8 +46,8 @@ def test_a_paper_without_claims_and_head_is_read_as_before(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('F = "28.45"', "F = 28.45", ["direction.anova.F", "28.45", "string"]),
-        ('F = "28.45"', 'F = "28,45"', ["direction.anova.F", "'28,45'", "pattern"]),
+        ('F = "28.45"', "F = 28.45", ["direction.anova.F", "28.45", "must be text"]),
+        ('F = "28.45"', 'F = "28,45"', ["direction.anova.F", "'28,45'", "digits as they are printed"]),
         ('F = "28.45"', 'F = "28.45"\nG = 1', ["direction.anova.G", "1", "unknown key"]),
         ('F = "28.45"\n', "", ["direction.anova.F", "missing"]),
         ('p = "0.205"', 'p = "20.5"', ["direction.binomial.0.p", "'20.5'", "above 1"]),
