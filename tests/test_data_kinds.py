@@ -162,6 +162,8 @@ def test_the_command_keeps_them_apart_in_tables_and_figures(recoil: Recoil, mixe
     page = (tmp_path / "both" / "report.md").read_text()
     assert page.index("\n## People at a simulated gun\n") < page.index("\n## Synthetic participants\n")
     assert page.count("(figures/synthetic/figure-results.png)") == 1
+    top = page.partition("\n## ")[0]
+    assert "DATA OF PEOPLE AT A SIMULATED GUN AND OF SYNTHETIC PARTICIPANTS are shown as well" in top
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.report.page import write_page
-from analysis.report.section import PageHead, Section, Table, shortened
+from analysis.report.section import PageHead, PageNotice, Section, Table, shortened
 from analysis.report.serial import as_json
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import sections_of_designs
@@ -49,6 +49,14 @@ def _log_files(report: ReportData) -> Iterator[Section]:
     if report.files:
         listed = shortened([names[file].as_posix() for file in report.files], "log files")
         yield Section(title="Log files", items=listed, appendix=True, folded=True)
+
+
+def _notices_of_kept_apart(report: ReportData) -> Iterator[PageNotice]:
+    """A line on top where the page shows data of other kinds as well."""
+    if report.apart:
+        others = " and of ".join(OF_KIND[one.statistics.data_kind] for one in report.apart)
+        text = f"DATA OF {others.upper()} are shown as well, in sections of their own behind these."
+        yield PageNotice(text=text, kind="warning")
 
 
 def _kept_apart(report: ReportData) -> Iterator[Section]:
@@ -99,6 +107,6 @@ def write_report(out: Path, report: ReportData) -> None:
     write_figures(out / "figures", report)
     for one in report.apart:
         write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
-    head = PageHead(notices=tuple(notices(report)), files=(STATISTICS, *report.beside))
+    head = PageHead(notices=(*notices(report), *_notices_of_kept_apart(report)), files=(STATISTICS, *report.beside))
     write_page(out, report.title, sections(report), head)
     (out / STATISTICS).write_bytes(as_json(report.statistics))
