@@ -214,8 +214,8 @@ def _covariance(theta: FloatArray, peak: _Peak) -> FloatArray | None:
     values = np.linalg.eigvalsh(bent)
     if values[0] <= _FLAT * values[-1]:
         return None
-    covariance: FloatArray = np.linalg.inv(bent)[: theta.size - 1, : theta.size - 1]
-    return covariance
+    covariance = np.linalg.inv(bent)[: theta.size - 1, : theta.size - 1]
+    return np.asarray(covariance, dtype=np.float64)
 
 
 def _upwards(
