@@ -22,7 +22,7 @@ from experiments.design.language import TRAIN_INTERVAL
 from experiments.design.planned import planned_run, plans_of_groups
 from experiments.design.stimuli import limits, shown_cell, unchanged_methods
 from experiments.record.design_table import columns
-from experiments.record.tables import MAY_LACK, TABLES
+from experiments.record.tables import MAY_LACK, TABLES, unguard
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw, check_laws
 
 
@@ -147,7 +147,7 @@ def _answer_rows(table: Path, lines: Any, columns: tuple[str, ...]) -> Iterator[
     for row in filter(None, lines):
         if len(row) != len(columns):
             raise ConfigError(f"{table}: line {lines.line_num}: {len(row)} fields; there must be {len(columns)}")
-        yield dict(zip(columns, row, strict=True))
+        yield dict(zip(columns, map(unguard, row), strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 import recoil
+from analysis.report.streams import forgive_streams
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.words import RecoilError, few_of_each
 from recoil.commands import guns, numbers, predictions, sessions
@@ -68,6 +69,7 @@ app.add_typer(predictions.app, name="fit")
 
 def main() -> None:
     """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
+    forgive_streams()
     os.umask(0o077)  # what is written here is about people: for its owner alone
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):  # not every system knows all three

@@ -24,6 +24,7 @@ from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
+from experiments.record.tables import guard
 from experiments.study.folders import PlaceError
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 
@@ -110,7 +111,7 @@ def _csv(path: Path, rows: Sequence[Mapping[str, str]], columns: tuple[str, ...]
     writer = csv.DictWriter(text, columns)
     writer.writeheader()
     try:
-        writer.writerows(rows)
+        writer.writerows({name: guard(cell) for name, cell in row.items()} for row in rows)
     except ValueError as error:
         raise ConfigError(f"{path}: line 1: answers: {error}; its columns are {', '.join(columns)}") from error
     return text.getvalue().encode()

@@ -77,7 +77,11 @@ CASES: dict[str, Any] = {
     "people of two groups": lambda folder: folder / "grip.toml",
     "pairs, a gun of another name": lambda folder: folder / "pairs.toml",
     "a title that has all that is hard to write": lambda folder: (
-        edited(folder / "gun.toml", ('label = "Vibration"', f"label = {json.dumps(MANY_LINES)}")),
+        edited(
+            folder / "gun.toml",
+            ('label = "Vibration"', f"label = {json.dumps(ODD)}"),
+            ('title = "Ungrounded', f"title = {json.dumps(MANY_LINES)} # "),
+        ),
         edited(folder / "direction.toml", ('"Direction recognition of a shot"', json.dumps(ODD))),
     )[1],
     "words that are hard to write": lambda folder: (

@@ -145,7 +145,9 @@ def asked(**keys):
         ({"practice": {"repetitions": 2}}, "a practice needs of"),
         ({"practice": {"of": ["method"]}}, "a practice needs repetitions"),
         ({"factors": ONE | {"grip": {"levels": ["one"], "between": True}}}, "between = true with one level"),
-        ({"factors": ONE | {"grip": {"levels": ["=1", "two"]}}}, "a spreadsheet takes for a formula"),
+        ({"factors": ONE | {"grip": {"levels": ["one\ntwo", "two"]}}}, "a level holds the character U+000A"),
+        ({"factors": ONE | {"grip": {"levels": ["\u202eone", "two"]}}}, "a level holds the character U+202E"),
+        ({"factors": ONE | {"grip": {"levels": ["x" * 201, "two"]}}}, "a level has 201 characters; a name has at most"),
         ({"design": "excluded"}, "design = 'excluded': the statistics have another part of that name; choose another"),
         ({"factors": ONE | {"Method": {"levels": ["x", "y"]}}}, "method, Method differ in case alone"),
         (

@@ -17,7 +17,8 @@ from matplotlib.text import Text
 from analysis.logs.reading import read_logs
 from analysis.report.figures import style
 from analysis.report.figures.shot import ShotPanel, figure_5
-from analysis.report.figures.style import display_name, stars
+from analysis.report.figures.style import stars
+from analysis.report.labels import display_name
 from analysis.stats.cells import ByParticipant
 from analysis.summary.figures.results import figure_8, figure_directions
 from analysis.summary.figures.trade import figure_response_times

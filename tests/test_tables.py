@@ -75,11 +75,12 @@ def test_a_negative_number_gets_no_apostrophe() -> None:
     assert (row["response_time_s"], row["trial"]) == ("-0.25", "-1")
 
 
-def test_text_is_guarded_in_every_text_column_and_in_no_other() -> None:
+def test_text_is_guarded_in_every_column_of_words_and_levels_and_in_no_other() -> None:
     for experiment, table in tables.TABLES.items():
         [row] = read(table_bytes(tables.TABLES[experiment], [{column.name: "=1" for column in table}]))
-        assert {name for name, cell in row.items() if cell == "'=1"} == {c.name for c in table if c.type == "text"}
-        assert {name for name, cell in row.items() if cell == "=1"} == {c.name for c in table if c.type != "text"}
+        words = {column.name for column in table if column.type in ("text", "level")}
+        assert {name for name, cell in row.items() if cell == "'=1"} == words
+        assert {name for name, cell in row.items() if cell == "=1"} == {column.name for column in table} - words
 
 
 # RFC 4180

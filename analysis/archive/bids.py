@@ -151,7 +151,7 @@ def described(column: Column, name: str) -> ColumnDescription:
     if column.unit:
         found["Units"] = column.unit
     if column.levels:
-        found["Levels"] = {level: _LEVELS.get(level, level) for level in column.levels}
+        found["Levels"] = {tables.guard(level): _LEVELS.get(level, level) for level in column.levels}
     return found | _MORE.get(name, {})
 
 
@@ -372,7 +372,7 @@ def _cell(column: Column, value: Cell) -> str:
     if isinstance(value, float):
         return repr(float(value))
     text = one_line(str(value))
-    return (tables.guard(text) if column.type == "text" else text) or NOT_AVAILABLE
+    return tables.guard(text) or NOT_AVAILABLE
 
 
 def one_line(text: str) -> str:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.logs.files import BadLogError
 from analysis.logs.texts import Cell, Texts
+from experiments.config.lines import name_fault
 from experiments.design.language import NumberScale
 from experiments.record import tables
 from experiments.record.tables import CLOCK_SET_BACK, Column
@@ -54,8 +55,10 @@ def cell_fault(column: Column, text: str) -> str:
         return f"{quoted(text)} is not a finite number with a decimal point"
     if column.type in ("integer", "number"):
         return _number_fault(column, text)
-    if column.levels and text not in column.levels:
+    if column.levels and tables.unguard(text) not in column.levels:
         return f"{quoted(text)} is not allowed (rule: one of {', '.join(column.levels)})"
+    if column.type == "level" and (fault := name_fault(tables.unguard(text))):
+        return f"{quoted(text)} {fault}"
     return ""
 
 
@@ -80,7 +83,7 @@ def cell_value(column: Column, text: str) -> Cell:
         return float(text)
     if column.type in ("integer", "flag"):
         return int(text)
-    return tables.unguard(text) if column.type == "text" else text
+    return tables.unguard(text)
 
 
 def quoted(text: str) -> str:

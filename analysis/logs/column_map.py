@@ -12,6 +12,7 @@ So the same rules check them. `configs/examples/columns.toml` shows every key. W
   `instruction` is what the participant was told, as speed or accuracy; `correct`, where the other program said so, is
   held against direction and response;
 - `[values.NAME]`: what a cell of NAME's column means ("f" = "forward");
+- `[method]`: `levels`, the methods in the order in which results show them, and `labels`, their names in print;
 - `[response_time]`: the `unit`, s or ms; `[rating]`: `scale_min` and `scale_max`, mapped to 0 and 10, and the `grain`
   between ratings, if there is one;
 - `[[skip]]`: rows to leave out, where a `column` is one of `values`, or `empty`.
@@ -26,12 +27,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.files import BadLogError
 from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
+from analysis.logs.names import MethodNames
 from analysis.logs.texts import CsvRecord
-from experiments.config.door import Model
+from experiments.config.door import Model, once
+from experiments.config.lines import LineText
 from experiments.design.language import NumberScale
 from experiments.record import tables
 from experiments.tasks.questions import on_scale
@@ -118,6 +121,18 @@ class ValuesMapping(Model):
     correct: dict[str, bool] = Field(default_factory=dict)
 
 
+class MethodsMapping(Model):
+    """The methods in the order in which results show them, and what they are called in print."""
+
+    levels: Annotated[tuple[LineText, ...], AfterValidator(once)] = ()
+    labels: dict[str, LineText] = Field(default_factory=dict)
+
+    @property
+    def names(self) -> MethodNames:
+        """What the map says of the methods' names."""
+        return MethodNames(order=self.levels, labels=self.labels)
+
+
 class ColumnMap(Model):
     """A whole map."""
 
@@ -129,6 +144,7 @@ class ColumnMap(Model):
     participant: ParticipantMapping
     columns: ColumnNames
     values: ValuesMapping = ValuesMapping()
+    method: MethodsMapping = MethodsMapping()
     response_time: ResponseTimeMapping | None = None
     rating: ScaleMapping | None = None
     skip: tuple[Skip, ...] = ()
@@ -282,7 +298,7 @@ def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
     return row | {
         "participant_id": code,
         "experiment": mapping.experiment,
-        "method": mapping.values.method.get(method, method),
+        "method": tables.guard(mapping.values.method.get(method, method)),
         "gun": mapping.gun,
     }
 
@@ -325,7 +341,7 @@ def _check_correct(line: _Line, correct: str, because: str, mapping: ColumnMap) 
 def _instruction(line: _Line, mapping: ColumnMap) -> str:
     """The instruction; one that the map does not name keeps its name."""
     cell = line.cells[mapping.columns.instruction] if mapping.columns.instruction else tables.MISSING
-    return mapping.values.instruction.get(cell, cell)
+    return tables.guard(mapping.values.instruction.get(cell, cell))
 
 
 def _rating(line: _Line, mapping: ColumnMap) -> _Row:

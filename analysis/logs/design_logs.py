@@ -14,13 +14,14 @@ import pandas as pd
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
 from analysis.logs.files import BadLogError, code_in_name, experiment_in_name, read_content
 from analysis.logs.journals import compared_with, journal_of
+from analysis.logs.names import gun_labels
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.rebuild import began_with
 from experiments.record import journal
 from experiments.record.design_table import columns
-from experiments.record.journal import JournalError
+from experiments.record.journal import Head, JournalError
 from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
 from experiments.tasks.questions import correct_columns, is_right
 
@@ -31,6 +32,7 @@ class DesignLogs:
 
     design: DesignConfig
     table: pd.DataFrame
+    gun_labels: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +47,7 @@ class DesignLog:
     key: str
     journal: str
     rows: tuple[Mapping[str, object], ...]
+    gun_labels: Mapping[str, str]
 
 
 def is_of_design(path: str) -> bool:
@@ -58,18 +61,18 @@ def read_design_log(path: str, made: bytes | None = None) -> DesignLog:
     `BadLogError`: it breaks a rule, or nothing says what its columns mean.
     """
     content = read_content(path) if made is None else made
-    data, design, plan = _design_of(path)
+    data, design, head = _design_of(path)
     rows = tuple(_rows(content, design))
     code = _code(path, rows)
-    _check_plan(design, plan, rows)
+    _check_plan(design, head.plan, rows)
     _check_times(design, rows)
     _check_onsets(rows)
     said = compared_with(data, path, content)
-    return DesignLog(code=code, design=design, key=_key(design), rows=rows, journal=said)
+    return DesignLog(code=code, design=design, key=_key(design), rows=rows, journal=said, gun_labels=gun_labels(head))
 
 
-def _design_of(path: str) -> tuple[bytes, DesignConfig, Plan]:
-    """The bytes of the journal beside a log, and the design and plan in its first line."""
+def _design_of(path: str) -> tuple[bytes, DesignConfig, Head]:
+    """The bytes of the journal beside a log, the design in its first line, and that line."""
     beside = Path(journal_of(path))
     if not beside.is_file():
         raise BadLogError(f"there is no {beside.name} beside it, which says what the columns mean; keep both together")
@@ -78,7 +81,7 @@ def _design_of(path: str) -> tuple[bytes, DesignConfig, Plan]:
         head = journal.head_of(beside, data)
         if head is None:
             raise BadLogError(f"{beside.name} has no whole first line, so nothing says what the columns mean")
-        return data, began_with(head), head.plan
+        return data, began_with(head), head
     except JournalError as error:
         raise BadLogError(str(error)) from error
 
@@ -190,5 +193,6 @@ def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> t
             for row in log.rows
         ]
         names = [column.name for column in columns(some[0][0].design)]
-        found.append(DesignLogs(design=some[0][0].design, table=pd.DataFrame(rows, columns=["study", *names])))
+        table = pd.DataFrame(rows, columns=["study", *names])
+        found.append(DesignLogs(design=some[0][0].design, table=table, gun_labels=some[0][0].gun_labels))
     return found, {log.key for log, _ in logs} - set(main.values())

@@ -62,7 +62,7 @@ class Problem:
         who = "" if named else f"participant {self.participant} of "
         line = "" if self.line is None else f", line {self.line}"
         column = "" if self.column is None else f", column {self.column}"
-        return f"{who}{self.file}{line}{column}: {self.message}"
+        return f"{who}{shown_name(self.file)}{line}{column}: {self.message}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,9 +127,9 @@ def names_below(files: Iterable[Path]) -> dict[Path, Path]:
 
 def below(problem: Problem, shown: Path) -> str:
     """A problem with its file's folder as it is shown: its remedy names the journal there as well."""
-    text, instead = str(problem), "" if shown == Path() else f"{shown.as_posix()}/"
+    text, instead = str(problem), "" if shown == Path() else f"{shown_name(shown.as_posix())}/"
     for folder in (problem.file.parent.absolute(), problem.file.parent):
-        text = text.replace(f"{folder}{os.sep}", instead) if folder != Path() else text
+        text = text.replace(f"{shown_name(folder)}{os.sep}", instead) if folder != Path() else text
     return text
 
 
@@ -217,7 +217,7 @@ def study_names(folders: Iterable[str]) -> dict[str, str]:
     >>> study_names(["/data/kyoto"])
     {'/data/kyoto': 'kyoto'}
     """
-    ways = {folder: PurePath(folder).parts for folder in sorted(folders)}
+    ways = {folder: PurePath(shown_name(folder)).parts for folder in sorted(folders)}
     shared = _shared(list(ways.values()))
     tails = [way[shared:][::-1] for way in ways.values()]
     behind = _shared(tails)
@@ -225,6 +225,15 @@ def study_names(folders: Iterable[str]) -> dict[str, str]:
     if len(ways) > 1 and all(ends.values()):
         return {folder: "/".join(end) for folder, end in ends.items()}
     return {folder: "/".join(way[shared - 1 :]) for folder, way in ways.items()} if ways else {}
+
+
+def shown_name(path: str | PurePath) -> str:
+    r"""A path as text, whatever bytes it is made of: those that are no UTF-8 are escaped.
+
+    >>> shown_name("caf\udce9/results")
+    'caf\\xe9/results'
+    """
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
 def _shared(ways: list[tuple[str, ...]]) -> int:

@@ -30,6 +30,7 @@ from analysis.logs.files import (
 )
 from analysis.logs.journals import BegunRun, RunFile, compared, gone, made_again, run_file, without_table
 from analysis.logs.kinds import kept_out, kind_of_design, kinds_of, kinds_there
+from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
@@ -73,6 +74,8 @@ class Logs:
     """Folder and code of everyone in the registers of the folders that were read."""
     names: Mapping[str, str] = field(default_factory=dict)
     """Short names of the studies' folders."""
+    methods: MethodNames = field(default_factory=MethodNames)
+    """The order of methods and what they are called in print."""
 
     def person(self, study: str, code: str) -> str:
         """What a participant is called in the tables."""
@@ -243,7 +246,9 @@ def read_logs(
     kinds = kinds_there(reading.kinds[number] for number in reading.studies)
     if not include_synthetic:
         reading.keep_out(kinds[0])
-    first, *apart = [_of_kind(reading, designs, kind, kinds[0]) for kind in (kinds if include_synthetic else kinds[:1])]
+    told = mapping.method.names if mapping else MethodNames()
+    parts = kinds if include_synthetic else kinds[:1]
+    first, *apart = [_of_kind(reading, designs, kind, kinds[0], told) for kind in parts]
     runs_of = reading.runs_by_kind(runs, kinds[0])
     return replace(
         first,
@@ -256,19 +261,24 @@ def read_logs(
     )
 
 
-def _of_kind(reading: _Reading, designs: dict[int, DesignLog], kind: DataKind, first: DataKind) -> Logs:
+def _of_kind(
+    reading: _Reading, designs: dict[int, DesignLog], kind: DataKind, first: DataKind, told: MethodNames
+) -> Logs:
     """The good logs of one kind of data; where nobody answered, they count as of the first."""
     mine = {number: study for number, study in reading.studies.items() if (reading.kinds[number] or first) == kind}
     names = study_names(folder for folder in set(mine.values()) if Path(folder).is_absolute())
     studies = {number: names.get(study, study) for number, study in mine.items()}
     by_design = _by_design(reading, {number: log for number, log in designs.items() if number in mine}, studies)
-    files = {number // _LOGS_A_FILE for number in mine}
+    files = {number: file for number, file in reading.files.items() if number in {one // _LOGS_A_FILE for one in mine}}
+    trials, ratings = (joined(experiment, reading.blocks, studies) for experiment in ("direction", "preference"))
+    methods = {str(method) for table in (trials, ratings) for method in table["method"].unique()}
     return Logs(
-        trials=joined("direction", reading.blocks, studies),
-        ratings=joined("preference", reading.blocks, studies),
+        trials=trials,
+        ratings=ratings,
+        methods=names_beside(files.values(), methods, told),
         designs=by_design,
         problems=(),
-        files=tuple(file for number, file in reading.files.items() if number in files),
+        files=tuple(files.values()),
         names={study: names.get(study, study) for study in mine.values()},
         kind=kind,
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from analysis.report.section import PNG_DPI, PageHead, Section
+from experiments.record.storage import write_whole
 
 _VERDICTS = (
     *("agrees", "differs", "differs as predicted", "not published", "not obtained"),
@@ -30,7 +31,7 @@ def write_page(out: Path, title: str, parts: tuple[Section, ...], head: PageHead
     """Write `report.html` and `report.md` of finished sections; their pictures stand in `out / "figures"` already."""
     for name in ("report.html", "report.md"):
         text = _render(f"{name}.j2", title, parts, head, out / "figures")
-        (out / name).write_text(text, encoding="utf-8", newline="\n")
+        write_whole(out / name, text.encode("utf-8", "backslashreplace"))  # names of files may be no text
 
 
 def markdown(text: str) -> str:

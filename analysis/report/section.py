@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from analysis.report.labels import cut_names
+
 LISTED = 100
 """A list longer than this is cut: a page of ten thousand rows is read by nobody, and opens slowly."""
 SHOWN = 50
@@ -64,6 +66,15 @@ class PageHead:
 
     notices: tuple[PageNotice, ...] = ()
     files: tuple[str, ...] = ()
+
+
+def names_in_full() -> tuple[Section, ...]:
+    """The names that were cut on a page; no section where none was."""
+    rows = tuple(cut_names().items())
+    if not rows:
+        return ()
+    table = Table(caption="Names that are cut above and in figures", header=("Cut as", "In full"), rows=rows)
+    return (Section(title="Names in full", tables=(table,)),)
 
 
 def origin_table(facts: Mapping[str, object]) -> Table:

@@ -98,18 +98,21 @@ class NotebookResult(ABC):
         return self.to_frame().to_html(index=False, float_format="{:.4g}".format)
 
 
-def as_json(result: Any) -> bytes:
-    """A result as the text of a JSON file."""
-    return (json.dumps(plain(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+def as_json(result: Any, *, in_ascii: bool = False) -> bytes:
+    """A result as the text of a JSON file; what is no text, as in names of files, is escaped."""
+    text = json.dumps(plain(result), indent=1, ensure_ascii=in_ascii, allow_nan=False) + "\n"
+    return text.encode("utf-8", "backslashreplace")
 
 
 def as_csv(header: Iterable[str], rows: Iterable[Iterable[object]]) -> bytes:
-    """A header and rows as the content of a CSV file: RFC 4180, UTF-8."""
+    """A header and rows as the content of a CSV file: RFC 4180, UTF-8, no text of it a formula."""
+    from experiments.record.tables import guard  # noqa: PLC0415 - commands are to answer at once
+
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(header)
-    writer.writerows(rows)
-    return text.getvalue().encode()
+    writer.writerows([guard(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    return text.getvalue().encode("utf-8", "backslashreplace")
 
 
 def _members(result: Any) -> Iterator[tuple[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -12,8 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from analysis.report.labels import text_columns
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json as in_json
+from analysis.report.streams import takes_all
 from device.words import RecoilError
 
 if TYPE_CHECKING:
@@ -58,16 +61,41 @@ def in_text(section: Section) -> str:
 def with_tables(section: Section, *, ruled: bool = False, unfolded: int = 0) -> str:
     """A section as it stands on a terminal, as wide as that: its title, its tables, then what it says, line by line.
 
-    `ruled`: a line between rows; so many columns from the left are `unfolded`. Nothing in it is taken for mark-up.
+    `ruled`: a line between rows; so many columns from the left are `unfolded`. Nothing in it is taken for mark-up. A
+    table that would have to break words is told row by row, a line a cell.
     """
     from rich.console import Console
 
     text = io.StringIO()
     console = Console(file=text, width=shutil.get_terminal_size((WIDTH, 24)).columns, highlight=False, markup=False)
     for table in section.tables:
-        console.print(_drawn(table, ruled=ruled, unfolded=unfolded))
+        if not table.rows or _least_width(table) <= console.width:
+            console.print(_drawn(table, ruled=ruled, unfolded=unfolded))
+        else:
+            text.write("\n".join(_row_by_row(table, console.width)) + "\n")
     lines = [text.getvalue().rstrip("\n"), *section.paragraphs, *section.items]
     return "\n".join([section.title, *lines] if section.title else lines)
+
+
+_LONG_WORD = 24
+"""A word that is longer, as a path may be, is broken."""
+
+
+def _least_width(table: Table) -> int:
+    """How wide a table is at least, in which no word is broken."""
+    columns = zip(table.header, *table.rows, strict=True)
+    words = ([word for cell in column for word in cell.split()] for column in columns)
+    return 1 + sum(3 + min(max(map(text_columns, some), default=0), _LONG_WORD) for some in words)
+
+
+def _row_by_row(table: Table, width: int) -> Iterator[str]:
+    """The rows below each other: the first cell, then the others that hold something, under their headings."""
+    for first, *others in table.rows:
+        yield first
+        for heading, cell in zip(table.header[1:], others, strict=True):
+            for place, line in enumerate(cell.splitlines()):
+                began = f"  {heading}: " if place == 0 else "    "
+                yield from textwrap.wrap(line, width, initial_indent=began, subsequent_indent="    ")
 
 
 def _drawn(table: Table, *, ruled: bool, unfolded: int) -> RichTable:
@@ -84,7 +112,7 @@ def _drawn(table: Table, *, ruled: bool, unfolded: int) -> RichTable:
 
 def show(result: Any, text: str, as_json: bool) -> None:
     """The result on stdout: for programs, or the text for people."""
-    sys.stdout.write(in_json(result).decode() if as_json else f"{text}\n")
+    sys.stdout.write(in_json(result, in_ascii=not takes_all(sys.stdout)).decode() if as_json else f"{text}\n")
 
 
 def each_of(names: Sequence[_Name], do: Callable[[_Name], _Found]) -> tuple[list[_Found], int]:

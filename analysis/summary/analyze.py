@@ -9,6 +9,7 @@ from pathlib import Path
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study, left_out_by_files
+from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.audit.page import predictions
@@ -130,7 +131,7 @@ def report_title(paths: Sequence[Path]) -> str:
     >>> report_title([Path("oslo"), Path("kyoto")]), report_title([Path(f"P{i}.csv") for i in range(20)])
     ('Statistics of kyoto, oslo', 'Statistics of P0.csv, P1.csv, P10.csv and 17 more')
     """
-    names = sorted({path.name or path.absolute().name or str(path) for path in paths})
+    names = sorted({shown_name(path.name or path.absolute().name or path) for path in paths})
     more = f" and {len(names) - _TITLED} more" if len(names) > _TITLED else ""
     return f"Statistics of {', '.join(names[:_TITLED])}{more}"
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -24,16 +25,18 @@ from analysis.stats.factorial import factorial_anova
 from analysis.stats.paired import friedman
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, Origin, QuestionSummary
 from experiments.design.config import DesignConfig
-from experiments.design.language import Level, QuestionConfig, shown_level
+from experiments.design.language import METHOD_FACTOR, Level, QuestionConfig, shown_level
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import runs_of_groups
 from experiments.tasks.questions import chance, correct_columns
 
 
-def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
+def summarise(
+    design: DesignConfig, table: pd.DataFrame, gun_labels: Mapping[str, str] = MappingProxyType({})
+) -> DesignSummary:
     """The statistics of a design from its table: one row a trial, the columns of `design_table.columns`.
 
-    Pairs are described, not tested.
+    Pairs are described, not tested. `gun_labels`: what the gun calls its methods.
     """
     asked = {name: question for name, question in design.questions.items() if question.kind != "text"}
     return DesignSummary(
@@ -45,7 +48,19 @@ def summarise(design: DesignConfig, table: pd.DataFrame) -> DesignSummary:
         words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
         assumed=design.assumed,
         protocol=methods_section(design, runs_of_groups(design)),
+        labels=_labels(design, gun_labels),
     )
+
+
+def _labels(design: DesignConfig, gun_labels: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """What the levels in each column are called: as the design says, else as the gun does of its methods."""
+    found: dict[str, dict[str, str]] = {}
+    for name, factor in design.factors.items():
+        labels = {**(gun_labels if name == METHOD_FACTOR else {}), **factor.labels}
+        own = {level: labels[level] for level in map(shown_level, factor.all_levels) if level in labels}
+        columns = [name, *([f"{name}_1", f"{name}_2"] if name == design.trial.compare else [])]
+        found |= dict.fromkeys(columns, own) if own else {}
+    return found
 
 
 def _hands(design: DesignConfig, table: pd.DataFrame) -> Origin:

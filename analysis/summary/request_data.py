@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.logs.exclusions import complete_rows
+from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
 from analysis.summary.designs import question_scores
@@ -41,15 +42,15 @@ def request_data(logs: Logs, request: AnyRequest) -> RequestData:
     if request.of in there:
         if request.question is not None:
             raise ValueError(f"question: {request.of} has one measure; leave the key out")
-        return _of_experiment(request.of, *there[request.of])
+        return _of_experiment(request.of, *there[request.of], logs.methods)
     if request.of in designs:
         return _of_design(designs[request.of].design, request.question, designs[request.of].table)
     raise ValueError(f"of = {request.of!r}: there are no logs of it; there are some of {', '.join((*there, *designs))}")
 
 
-def _of_experiment(name: str, table: pd.DataFrame, measure: str) -> RequestData:
+def _of_experiment(name: str, table: pd.DataFrame, measure: str, names: MethodNames) -> RequestData:
     """Everybody who is complete; in direction the forward shots, as the report's ANOVA has them."""
-    methods = methods_in(table)
+    methods = methods_in(table, names)
     rows = complete_rows(coded(table), name, methods)[0]
     if name == "direction":
         rows = rows[rows["direction"] == "forward"]

@@ -24,7 +24,8 @@ from analysis.summary.remarks_coding import CodedRemarks
 from analysis.summary.requests import Requested
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
-from experiments.design.language import Level
+from experiments.design.language import Level, shown_level
+from experiments.design.methods_section import level_words
 from experiments.record.tables import DataKind
 
 
@@ -355,6 +356,7 @@ class DesignSummary:
 
     `words`: how many texts were said to each question that asks for them; `assumed`: what the design says it assumes;
     `protocol`: the design as a Methods section.
+    `labels`: what the levels in each column are called in print, where that is not their code.
     """
 
     title: str
@@ -365,6 +367,11 @@ class DesignSummary:
     words: Mapping[str, int] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
     protocol: tuple[str, ...] = ()
+    labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    def label(self, factor: str, level: Level) -> str:
+        """What a level of a factor is called in print; a number with its unit, or the name of its factor."""
+        return self.labels.get(factor, {}).get(shown_level(level)) or level_words(factor, level)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -382,7 +389,8 @@ class StudyStatistics(NotebookResult):
     """The statistics of logs; None for an experiment without a log. `studies` of each study, if there are several.
 
     `designs` by their names, which stand beside the two experiments in the file. All are of one kind of data, which
-    `data_kind` names; those of other kinds, if they were asked for, are `kept_apart` in the same form.
+    `data_kind` names; those of other kinds, if they were asked for, are `kept_apart` in the same form. `labels`: what
+    methods are called in print, where that is not their code.
     """
 
     direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
@@ -391,6 +399,7 @@ class StudyStatistics(NotebookResult):
     excluded: tuple[LeftOut, ...] = ()
     participation: Participation | None = field(default=None, metadata=OPTIONAL)
     warnings: tuple[str, ...] = ()
+    labels: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)
     versions: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)
     studies: Mapping[str, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)
     rules: RulesApplied | None = field(default=None, metadata=OPTIONAL)

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.logs.exclusions import LeftOut, complete_rows
+from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.report.serial import undefined
 from analysis.stats.anova import Comparison, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired
@@ -74,9 +75,10 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False) -> results.
     log is left out. Participants who miss an answer or a method are left out of that experiment and listed in
     `excluded`. Numbers that are NaN or infinite are named in `warnings`. What stands apart in the logs is kept apart.
     """
-    direction, left_out = _direction(logs.trials, trade=trade, fits=fits) if len(logs.trials) else (None, [])
-    preference, also_out = _preference(logs.ratings) if len(logs.ratings) else (None, [])
-    designs = {one.design.design: summarise(one.design, one.table) for one in logs.designs}
+    names = logs.methods
+    direction, left_out = _direction(logs.trials, names, trade=trade, fits=fits) if len(logs.trials) else (None, [])
+    preference, also_out = _preference(logs.ratings, names) if len(logs.ratings) else (None, [])
+    designs = {one.design.design: summarise(one.design, one.table, one.gun_labels) for one in logs.designs}
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
     found = results.StudyStatistics(
         direction=direction,
@@ -84,6 +86,7 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False) -> results.
         designs=designs,
         excluded=(*left_out, *also_out, *lacking),
         data_kind=logs.kind,
+        labels=_labels((direction, preference), names),
     )
     apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
     said = (*_hasty(logs.trials), *_repeated(logs.ratings), *_warnings(found))
@@ -140,10 +143,16 @@ def statistics_versions() -> dict[str, str]:
     }
 
 
-def methods_in(table: pd.DataFrame) -> list[str]:
-    """The methods of a table: in the paper's order if they are all the paper's, else sorted."""
-    found = sorted(str(method) for method in table["method"].unique())
-    return [m for m in METHOD_ORDER if m in found] if set(found) <= set(METHOD_ORDER) else found
+def methods_in(table: pd.DataFrame, names: MethodNames) -> list[str]:
+    """The methods of a table in the order that is known of them, then the paper's, then as people count."""
+    found = {str(method) for method in table["method"].unique()}
+    return names.and_then(MethodNames(order=METHOD_ORDER)).ordered(found)
+
+
+def _labels(found: Sequence[results.WithinStatistics | None], names: MethodNames) -> dict[str, str] | None:
+    """The labels of the methods that were analysed; None if each is called by its code."""
+    methods = dict.fromkeys(method for one in found if one is not None for method in one.methods)
+    return {method: names.labels[method] for method in methods if names.labels.get(method, method) != method} or None
 
 
 def _version(name: str) -> str:
@@ -169,17 +178,21 @@ def _warnings(found: results.StudyStatistics) -> Iterator[str]:
         yield f"{place} is {why}; {UNDEFINED}"
 
 
-def _complete(table: pd.DataFrame, experiment: str) -> tuple[pd.DataFrame, list[str], list[LeftOut]]:
+def _complete(
+    table: pd.DataFrame, experiment: str, names: MethodNames
+) -> tuple[pd.DataFrame, list[str], list[LeftOut]]:
     """The complete participants' coded rows, with the instructions if there are some; the methods; who is left out."""
-    methods, rows = methods_in(table), coded(table)
+    methods, rows = methods_in(table, names), coded(table)
     if INSTRUCTION in table:
         rows[INSTRUCTION] = table[INSTRUCTION]
     complete, left_out = complete_rows(rows, experiment, methods)
     return complete, methods, left_out
 
 
-def _direction(table: pd.DataFrame, *, trade: bool, fits: bool) -> tuple[results.DirectionStatistics, list[LeftOut]]:
-    complete, methods, left_out = _complete(table, "direction")
+def _direction(
+    table: pd.DataFrame, names: MethodNames, *, trade: bool, fits: bool
+) -> tuple[results.DirectionStatistics, list[LeftOut]]:
+    complete, methods, left_out = _complete(table, "direction", names)
     cells = trial_cells(complete, methods)
     within = _within(cells.rates("forward"), "direction", origin_of(complete, "response_source"))
     found = results.DirectionStatistics(
@@ -197,8 +210,8 @@ def _direction(table: pd.DataFrame, *, trade: bool, fits: bool) -> tuple[results
     return replace(found, assumptions=assumptions(found)), left_out
 
 
-def _preference(table: pd.DataFrame) -> tuple[results.WithinStatistics, list[LeftOut]]:
-    complete, methods, left_out = _complete(table, "preference")
+def _preference(table: pd.DataFrame, names: MethodNames) -> tuple[results.WithinStatistics, list[LeftOut]]:
+    complete, methods, left_out = _complete(table, "preference", names)
     scores = _table(complete, "rating", methods)
     found = _within(scores, "preference", origin_of(complete, "rating_by"))
     return replace(found, assumptions=assumptions(found)), left_out

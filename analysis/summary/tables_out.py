@@ -3,7 +3,7 @@
 Of the paper's two experiments long and wide, of other designs long, with everyone in them. Long: a row a participant
 and condition. Wide: a row a participant, a column a method and measure, as in
 `vibration_rate_forward`; names start with a letter, hold letters, digits and underscores only, and have at most 64
-characters. RFC 4180, UTF-8; an empty cell is missing.
+characters. RFC 4180, UTF-8; an empty cell is missing; a text that a spreadsheet takes for a formula has a `'` in front.
 """
 
 from __future__ import annotations
@@ -138,8 +138,9 @@ def _csv(table: pd.DataFrame) -> bytes:
     for name in shown.columns:
         if shown[name].dtype.kind == "f":
             shown[name] = [_number(value) for value in shown[name].to_numpy(dtype=np.float64).tolist()]
-        elif shown[name].dtype.kind == "O":
-            shown[name] = [guard(value) if isinstance(value, str) else value for value in shown[name]]
+        elif shown[name].dtype.kind == "O" or name in _KEYS:
+            cells = shown[name].astype(object)
+            shown[name] = [guard(str(cell)) if isinstance(cell, str) else cell for cell in cells]
     return shown.to_csv(index=False, lineterminator="\r\n").encode("utf-8")
 
 

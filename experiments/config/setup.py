@@ -9,11 +9,12 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Generic, Literal, Self, TypeVar
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from device.methods import Method
 from device.parameters import GunParameters, VibrationParameters, damper_friction
 from experiments.config.door import Model, Text
+from experiments.config.lines import LineText, name_fault
 
 Numbers = dict[str, object]
 """A table for one of the device's parameter types, which say what may stand in it."""
@@ -34,7 +35,7 @@ class StripsConfig(Model):
 class MethodConfig(Model):
     """A rendering method: the actuator, the damper that is set by hand, and what differs from the gun's own numbers."""
 
-    label: Text
+    label: LineText
     actuator: Literal["voice-coil", "vibration"]
     damper: str = ""
     voice_coil: Numbers = Field(default_factory=dict)
@@ -63,6 +64,14 @@ class GunConfig(Model):
     vibration: Numbers = Field(default_factory=dict)
     methods: dict[str, MethodConfig] = Field(min_length=1)
     serial: SerialConfig = Field(default_factory=SerialConfig, exclude=True)
+
+    @field_validator("methods")
+    @classmethod
+    def _named_in_print(cls, methods: dict[str, MethodConfig]) -> dict[str, MethodConfig]:
+        for name in methods:
+            if fault := name_fault(name):
+                raise ValueError(f"the name of a method {fault}")
+        return methods
 
     _rendered: dict[str, Method] = PrivateAttr(default_factory=dict)
     """The methods as the device takes them, made once, when the gun is."""

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from device.words import Direction
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
 from experiments.config.findings import DESIGN_NAME
+from experiments.config.lines import LineText
 from experiments.design.language import (
     DIRECTION_FACTOR,
     EMPTY,
@@ -24,7 +25,6 @@ from experiments.design.language import (
     ColumnName,
     FactorConfig,
     FatigueConfig,
-    LineText,
     OpeningConfig,
     OrderConfig,
     PracticeConfig,

@@ -10,19 +10,12 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from experiments.config.door import Model, Text, once, printable
+from experiments.config.door import Model, once
 from experiments.config.findings import COLUMN_NAME, OWN_KEY
+from experiments.config.lines import LineText, PageText, name_fault
 
 MAX_TRIALS = 10_000
 """More trials than this are refused."""
-
-
-def _words(text: str) -> str:
-    """The text; `ValueError` as `printable`, and for blanks alone."""
-    printable(text)
-    if not text.strip():
-        raise ValueError("is blank; give it words or leave the key out")
-    return text
 
 
 ColumnName = Annotated[str, Field(pattern=COLUMN_NAME)]
@@ -32,8 +25,6 @@ Levels = tuple[Level, ...]
 DurationSeconds = Annotated[float, Field(gt=0, le=86_400)]
 PauseSeconds = Annotated[float, Field(ge=0, le=86_400)]
 ShotCount = Annotated[int, Field(ge=1, le=10_000)]
-LineText = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_words)]
-PageText = Annotated[Text, AfterValidator(_words)]
 
 METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL = (
     "method",
@@ -58,12 +49,8 @@ def _levels(levels: Levels) -> Levels:
     if len({isinstance(level, str) for level in levels}) > 1:
         raise ValueError(f"{', '.join(shown)} mixes words and numbers; use one kind")
     for level in levels:
-        if isinstance(level, str):
-            _words(level)
-            if level[0] in "=+-@'":
-                raise ValueError(
-                    f"{level!r} begins with {level[0]!r}, which a spreadsheet takes for a formula; rename it"
-                )
+        if isinstance(level, str) and (fault := name_fault(level)):
+            raise ValueError(f"a level {fault}")
     return levels
 
 

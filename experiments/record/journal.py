@@ -31,6 +31,7 @@ Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped",
 _KINDS = get_args(Kind)
 ENDING = "_journal.jsonl"
 """How the name of every journal ends."""
+_NOTHING = "nothing was recorded"
 _PATIENCE_S = 0.5
 """How long a journal is tried that somebody may only be looking at."""
 
@@ -143,7 +144,7 @@ class Journal:
         try:
             descriptor = storage.create(path)
         except OSError as error:
-            raise JournalError(f"{path}: cannot be created ({error.strerror}); nothing was recorded") from error
+            raise JournalError(f"{path}: cannot be created ({error.strerror}); {_NOTHING}") from error
         return cls(path, _held(path, descriptor), clock)
 
     @classmethod
@@ -181,10 +182,8 @@ class Journal:
         except (OSError, ValueError) as error:
             self._take_back()
             reason = error.strerror if isinstance(error, OSError) else error
-            raise JournalError(
-                f"{self.path}: record {self._count} cannot be written ({reason}); "
-                f"everything up to record {self._count - 1} is safe on the disk"
-            ) from error
+            safe = f"everything up to record {self._count - 1} is safe on the disk" if self._count else _NOTHING
+            raise JournalError(f"{self.path}: record {self._count} cannot be written ({reason}); {safe}") from error
         self._synced_s = self._clock.now()
         self._count += 1
         self._length += len(line)

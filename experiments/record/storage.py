@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 OWNER_FILE = 0o600
@@ -133,19 +135,30 @@ def _locked(descriptor: int, *, shared: bool) -> bool:
     return True
 
 
+@contextmanager
+def errors_name(path: Path) -> Iterator[None]:
+    """Errors of the system that say of no file where they happened, as a full disk does, say it of this one."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Put a whole file in its place at once: readers see the old one or the new one, never a part."""
     part = path.with_name(f".{path.name}.part")
-    part.unlink(missing_ok=True)
-    try:
-        descriptor = os.open(part, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)
-        try:
-            write_all(descriptor, data)
-            sync(descriptor)
-        finally:
-            os.close(descriptor)
-        part.replace(path)
-    except OSError:
+    with errors_name(path):
         part.unlink(missing_ok=True)
-        raise
-    sync_folder(path.parent)
+        try:
+            descriptor = os.open(part, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)
+            try:
+                write_all(descriptor, data)
+                sync(descriptor)
+            finally:
+                os.close(descriptor)
+            part.replace(path)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
+        sync_folder(path.parent)

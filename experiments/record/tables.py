@@ -252,6 +252,6 @@ def table_bytes(table: tuple[Column, ...], rows: Iterable[Row]) -> bytes:
 def _cell(column: Column, value: object) -> str:
     if value is None:
         return MISSING
-    if column.type == "text":
+    if column.type in ("text", "level"):
         return guard(str(value))
     return repr(value) if isinstance(value, float) else str(value)

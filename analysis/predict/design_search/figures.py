@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 
 from analysis.predict.design_search.choice import Designs
 from analysis.predict.design_search.results import DesignSearch, DrivePrediction
-from analysis.report.figures.style import BLACK, BLUE, INK, METHOD_LINES, ORANGE, VERMILION, drawn, light_grid
+from analysis.report.figures.style import BLACK, BLUE, INK, ORANGE, VERMILION, drawn, light_grid, method_line
 from analysis.stats.arrays import FloatArray
 
 BOTH = "both directions alike"
@@ -167,7 +167,7 @@ def figure_critical(found: DesignSearch, path_stem: Path) -> None:
         low, high = (np.clip(part, 0.0, top) for part in (band.low_V, band.high_V))
         axes.fill_between(x, low, high, color=BLUE, alpha=0.18, linewidth=0.0, label="95 % of the contours drawn")
         for n, (name, voltage_V) in enumerate(others.items()):
-            dashes = METHOD_LINES[(n + 1) % len(METHOD_LINES)]
+            dashes = method_line(n + 1)
             colour = (INK, INK, VERMILION, VERMILION, ORANGE)[n % 5]
             axes.plot(x, _finite(voltage_V), color=colour, linewidth=1.1, linestyle=dashes, label=name)
         name = f"{100.0 * critical.level:g} % right"

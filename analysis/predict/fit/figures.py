@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 
 from analysis.report.figures.style import (
     BLACK,
-    METHOD_LINES,
-    display_name,
     drawn,
+    drawn_name,
     legend_below,
     light_grid,
     method_colour,
+    method_line,
     reference_line,
     wrapped,
 )
@@ -130,7 +130,7 @@ def _draw_times(axes: Axes, panel: TimesPanel) -> None:
         times, shares = _thinned(observed[i], panel.trials)
         axes.plot(times, shares, marker, color=colour, markersize=3.5, mfc="white", label=f"{kind}, observed")
     told = "" if panel.instruction == "neutral" else f", {panel.instruction}"
-    axes.set_title(f"{display_name(panel.method)}{told}", loc="left", fontsize=9.0)
+    axes.set_title(f"{drawn_name(panel.method)}{told}", loc="left", fontsize=9.0)
     if len(panel.grid_s):
         axes.set_xlim(0.0, panel.grid_s[-1])
     axes.set_ylim(0.0, 102.0)
@@ -157,7 +157,7 @@ def _draw_point(axes: Axes, x: float, point: RatePoint, marker: str) -> None:
         zorder=3.0,
     )
     if point.friction_N is not None:
-        name = display_name(point.name)
+        name = drawn_name(point.name)
         axes.annotate(
             name, (x, rate), xytext=(7.0, -11.0), textcoords="offset points", fontsize=7.5, color="#333333", zorder=3.0
         )
@@ -170,7 +170,7 @@ def _draw_curve(axes: Axes, i: int, curve: RateCurve) -> None:
         axes.fill_between(curve.friction_N, *band, color=method_colour(i), alpha=0.2, linewidth=0.0)
         axes.plot(curve.friction_N, rate, color=method_colour(i), linewidth=1.8, label=curve.name)
         return
-    line = METHOD_LINES[i % len(METHOD_LINES)]
+    line = method_line(i)
     axes.plot(curve.friction_N, rate, color=method_colour(i), linestyle=line, linewidth=1.1, label=curve.name)
 
 
@@ -178,7 +178,7 @@ def _draw_spread(axes: Axes, spread: SimulatedSpread) -> None:
     light_grid(axes)
     for i, (name, (edges, counts)) in enumerate(spread.cases.items()):
         share = _densities(edges, counts)
-        axes.stairs(share, edges, color=method_colour(i), linestyle=METHOD_LINES[i], linewidth=1.3, label=name)
+        axes.stairs(share, edges, color=method_colour(i), linestyle=method_line(i), linewidth=1.3, label=name)
     top = axes.get_ylim()[1]
     for text, value in spread.published.items():
         axes.axvline(value, color=BLACK, linewidth=1.2)

@@ -12,16 +12,15 @@ from matplotlib.ticker import MaxNLocator
 from analysis.paper.recurrence import ShareOfStudies
 from analysis.predict.power.results import DesignPower
 from analysis.report.figures.style import (
-    METHOD_LINES,
     bounded,
     drawn,
     legend_below,
     light_grid,
     method_colour,
+    method_line,
+    method_marker,
     reference_line,
 )
-
-_MARKERS = "os^Dv<>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,8 +84,8 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
             x,
             share,
             color=colour,
-            linestyle=METHOD_LINES[i % len(METHOD_LINES)],
-            marker=_MARKERS[i % len(_MARKERS)],
+            linestyle=method_line(i),
+            marker=method_marker(i),
             markersize=3.5,
             linewidth=1.3,
             label=curve.name,
@@ -114,7 +113,7 @@ def _draw_rates(axes: Axes, claims: Sequence[str], designs: Sequence[DesignPower
             share,
             heights,
             xerr=[below, above],
-            fmt=_MARKERS[i % len(_MARKERS)],
+            fmt=method_marker(i),
             color=method_colour(i),
             markersize=4.0,
             linewidth=1.3,

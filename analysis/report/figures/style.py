@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,21 +15,29 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.text import Text
 
+from analysis.report.figures.glyphs import OWN_FONT, give_fonts, is_drawable
+from analysis.report.labels import cut_names, display_name, lines_of, some_labels, text_columns
 from analysis.report.section import PNG_DPI
+from experiments.record.storage import errors_name
 
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
+INDIGO, WINE, OLIVE = "#332288", "#882255", "#999933"
 INK = "#333333"
-METHOD_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, YELLOW)
-"""Okabe and Ito 2008: told apart with any common colour vision; those that stand out most from white first."""
-METHOD_LINES: tuple[str | tuple[int, tuple[float, ...]], ...] = ("-", "--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
-"""The methods' lines without colour."""
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INDIGO, OLIVE, WINE, YELLOW)
+"""Okabe and Ito 2008, told apart with any common colour vision, those that stand out most from white first; between
+them three of Tol 2021 for the seventh to the ninth."""
+_LINES: tuple[str | tuple[int, tuple[float, ...]], ...] = ("-", "--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)))
+_DASHES = (9.0, 3.0, 14.0)
+_MARKERS = "osD^vPX<>ph*d8H"
 DIRECTION_MARKERS = {"forward": "o", "backward": "^"}
 
+_LINE = 10
 
 _STYLE = {
-    "font.family": "DejaVu Sans",
+    "font.family": OWN_FONT,
     "font.size": 9.0,
     "axes.titlesize": 10.0,
     "axes.labelsize": 9.0,
@@ -49,10 +55,11 @@ def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure
     It lays its axes out so that nothing is clipped, and no pyplot knows of it.
     """
     settings: Any = dict(mpl.rcParamsDefault) | _STYLE | {"backend": "agg"}
-    with mpl.rc_context(settings):
+    with mpl.rc_context(settings), some_labels():
         layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.07, wspace=0.03, hspace=0.03)  # labels touch by default
         figure = Figure(figsize=(width_in, height_in), dpi=PNG_DPI, layout=layout, facecolor="white")
         yield figure
+        give_fonts(figure)
         save(figure, path_stem)
 
 
@@ -60,15 +67,57 @@ def save(figure: Figure, path_stem: Path) -> None:
     """`path_stem`.png, .svg and .pdf, without dates or versions inside. Folders are made."""
     path_stem.parent.mkdir(parents=True, exist_ok=True)
     png, svg, pdf = (path_stem.with_name(f"{path_stem.name}.{kind}") for kind in ("png", "svg", "pdf"))
+    lay_out(figure)
+    canvas: Any = figure.canvas
+    no_program: Any = {"Software": None}
+    with errors_name(path_stem):
+        imsave(png, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=no_program)
+        canvas = FigureCanvasSVG(figure)
+        canvas.print_svg(svg, metadata={"Date": None, "Creator": None})
+        canvas = FigureCanvasPdf(figure)
+        canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+
+
+def lay_out(figure: Figure) -> None:
+    """Draw a figure once and keep its layout for all files: savefig would lay out each of them twice."""
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
-    no_program: Any = {"Software": None}
-    imsave(png, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=no_program)
-    figure.set_layout_engine("none")  # all three in the one layout; savefig would draw each of them twice
-    canvas = FigureCanvasSVG(figure)
-    canvas.print_svg(svg, metadata={"Date": None, "Creator": None})
-    canvas = FigureCanvasPdf(figure)
-    canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    figure.set_layout_engine("none")
+    key = _key_lines(figure)
+    if key:
+        _write_key(figure, key)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+
+
+_KEY_PT = 7.5
+
+
+def _key_lines(figure: Figure) -> list[str]:
+    """The whole of each name that is cut in a figure, in lines as wide as the figure."""
+    shown = "\n".join(text.get_text() for text in figure.findobj(Text))
+    width = int(figure.get_figwidth() * 72.0 / (0.62 * _KEY_PT))
+    whole = (f"{mark} {name}" for mark, name in cut_names().items() if mark in shown)
+    return [line for text in whole for line in lines_of(text, width)]
+
+
+def _write_key(figure: Figure, lines: Sequence[str]) -> None:
+    """Lines below a figure that is laid out, which grows by them."""
+    width, height = figure.get_size_inches()
+    left, above = 0.06 / width, 0.5 * _KEY_PT / 72.0
+    key = figure.text(left, 0.0, "\n".join(lines), fontsize=_KEY_PT, va="top", linespacing=1.3, parse_math=False)
+    give_fonts(figure)
+    below = key.get_window_extent().height / figure.dpi + 2.0 * above
+    share = below / (height + below)
+    for text in figure.texts:
+        text.set_y(share + (1.0 - share) * text.get_position()[1])
+    for legend in figure.legends:
+        legend.set_bbox_to_anchor((0.0, share, 1.0, 1.0 - share), transform=figure.transFigure)
+    for axes in figure.axes:
+        box = axes.get_position()
+        axes.set_position((box.x0, share + (1.0 - share) * box.y0, box.width, (1.0 - share) * box.height))
+    figure.set_size_inches(width, height + below)
+    key.set_y(share - above / (height + below))
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
@@ -79,8 +128,81 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 
 
 def method_colour(i: int) -> str:
-    """The colour of the method at place `i`, from the start again after the last."""
-    return METHOD_COLOURS[i % len(METHOD_COLOURS)]
+    """The colour of the method at place `i`, from the start again after the tenth."""
+    return _COLOURS[i % len(_COLOURS)]
+
+
+def method_line(i: int) -> Any:
+    """The line of the method at place `i`; no other place has the same.
+
+    >>> method_line(1), len({str(method_line(i)) for i in range(100)})
+    ('--', 100)
+    """
+    if i < len(_LINES):
+        return _LINES[i]
+    dots, kind = divmod(i - len(_LINES), len(_DASHES))
+    return (0, (_DASHES[kind], 2.0, *(1.0, 2.0) * (dots + 3 * (kind == 1))))
+
+
+def method_marker(i: int) -> str:
+    """The mark of the method at place `i`; no other place has the same.
+
+    >>> method_marker(2), method_marker(20)
+    ('D', '$21$')
+    """
+    return _MARKERS[i] if i < len(_MARKERS) else f"${i + 1}$"
+
+
+_APART_IN = 0.76
+"""So wide is the place of a method whose name stands below it in lines."""
+_WIDEST_IN = 16.0
+MANY_METHODS = 5
+"""With more methods panels stand one above the other, and a matrix shows which methods differ."""
+
+
+def width_for(methods: int) -> float:
+    """How wide a figure is, in inches, whose panels have so many methods side by side."""
+    return min(max(7.0, 2.2 + _APART_IN * methods), _WIDEST_IN)
+
+
+def name_ticks(axes: Axes, methods: Sequence[str], above: Sequence[str] = (), room_in: float | None = None) -> None:
+    """A tick with its name for each method, upright where there is no room; `above`: a line over each name.
+
+    `room_in`: how wide the panel is, where that is not the whole figure.
+    """
+    before = [f"{line}\n" for line in above] or [""] * len(methods)
+    if (room_in or axes.figure.bbox.width / PNG_DPI) < _APART_IN * len(methods):
+        names = [f"{line.strip()}  {drawn_name(method)}".strip() for line, method in zip(before, methods, strict=True)]
+        axes.set_xticks(range(len(methods)), names, rotation=90.0)
+    else:
+        names = [f"{line}{wrapped(method)}" for line, method in zip(before, methods, strict=True)]
+        axes.set_xticks(range(len(methods)), names)
+    axes.set_xlim(-0.6, len(methods) - 0.4)
+
+
+def legend_columns(width_in: float, names: Sequence[str], most: int = 3) -> int:
+    """How many names of a legend fit side by side into so many inches."""
+    widest = max(map(text_columns, names), default=1)
+    return max(1, min(most, len(names), int(width_in / (0.5 + 0.073 * widest))))
+
+
+def drawn_name(code: str) -> str:
+    r"""What a method or level is called in a figure: its code where no font here has the letters of its label.
+
+    >>> drawn_name("asymmetric-1"), drawn_name("2 $ a shot")
+    ('Asymmetric Force I', '2 \\$ a shot')
+    """
+    name = display_name(code)
+    return (name if is_drawable(name) else code).replace("$", r"\$")  # which begins no formula here
+
+
+def wrapped(code: str) -> str:
+    r"""The name of a method or level in short lines, broken at spaces and hyphens where it can be.
+
+    >>> wrapped("asymmetric-2"), wrapped("ramp-up-slowly")
+    ('Asymmetric\nForce II', 'ramp-up-\nslowly')
+    """
+    return "\n".join(lines_of(drawn_name(code), _LINE))
 
 
 def light_grid(axes: Axes) -> None:
@@ -108,40 +230,6 @@ def reference_line(axes: Axes, height: float, text: str) -> None:
         fontsize=7.5,
         color="#444444",
     )
-
-
-_DISPLAY_NAMES = {
-    "vibration": "Vibration",
-    "asymmetric-1": "Asymmetric Force I",
-    "asymmetric-2": "Asymmetric Force II",
-}
-
-
-def display_name(method: str) -> str:
-    """The method's name in print; a method the paper does not know keeps its own.
-
-    >>> display_name("asymmetric-2"), display_name("ramp")
-    ('Asymmetric Force II', 'ramp')
-    """
-    return _DISPLAY_NAMES.get(method, method)
-
-
-def wrapped(method: str) -> str:
-    r"""The method's name in short lines, broken at spaces and hyphens.
-
-    >>> wrapped("asymmetric-2"), wrapped("ramp-up-slowly")
-    ('Asymmetric\nForce II', 'ramp-up-\nslowly')
-    """
-    return "\n".join(textwrap.wrap(display_name(method), 10))
-
-
-def named(text: str) -> str:
-    """`text` with the paper's methods under the paper's names.
-
-    >>> named("asymmetric-2 above vibration, asymmetric-10 below")
-    'Asymmetric Force II above Vibration, asymmetric-10 below'
-    """
-    return re.sub(r"(?<![\w-])(vibration|asymmetric-[12])(?![\w-])", lambda found: display_name(found[1]), text)
 
 
 def stars(p: float) -> str:

@@ -6,17 +6,29 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import ScalarFormatter
 
-from analysis.report.figures.style import METHOD_LINES, display_name, drawn, light_grid, method_colour, reference_line
+from analysis.report.figures.style import (
+    MANY_METHODS,
+    drawn,
+    drawn_name,
+    legend_columns,
+    light_grid,
+    method_colour,
+    method_line,
+    method_marker,
+    name_ticks,
+    reference_line,
+    width_for,
+    wrapped,
+)
+from analysis.report.labels import text_columns
 from analysis.summary.results import ConditionSummary, DesignSummary, QuestionSummary
-from experiments.design.language import shown_level
-from experiments.design.methods_section import factor_words, level_words
+from experiments.design.language import Level, shown_level
+from experiments.design.methods_section import factor_words
 
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _ACROSS = 2
 _LEGEND_COLUMNS = 3
 _TICKS = 10
@@ -38,14 +50,23 @@ def figure_design(found: DesignSummary, path_stem: Path) -> None:
     shown = {name: question for name, question in found.questions.items() if question.cells}
     if not shown:
         raise ValueError("the figure of a design needs a question with an answer")
-    columns = min(_ACROSS, len(shown))
+    panel = max(map(_panel_width, shown.values()))
+    columns = min(_ACROSS, len(shown), int(width_for(99) / panel))
     rows = -(-len(shown) // columns)
-    with drawn(path_stem, 0.8 + 4.6 * columns, 0.4 + 3.6 * rows) as figure:
+    with drawn(path_stem, 0.8 + panel * columns, 0.4 + 3.6 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for spare in grid[len(shown) :]:
             spare.set_visible(False)
         for axes, (name, question) in zip(grid, shown.items(), strict=False):
-            _draw(axes, name, question)
+            _draw(axes, name, question, found)
+
+
+def _panel_width(question: QuestionSummary) -> float:
+    """How wide a question's panel is, in inches: for so many names along the axis."""
+    factor = _across(question)
+    levels = {cell.levels[factor] for cell in question.cells if factor in cell.levels} if factor is not None else set()
+    words = len(levels) if any(isinstance(level, str) for level in levels) else 0
+    return 4.6 if words <= MANY_METHODS else min(width_for(words), width_for(99) - 0.8)
 
 
 def _across(question: QuestionSummary) -> str | None:
@@ -59,7 +80,7 @@ def _factors(question: QuestionSummary) -> list[str]:
     return list(dict.fromkeys(name for cell in question.cells for name in cell.levels))
 
 
-def _draw(axes: Axes, name: str, question: QuestionSummary) -> None:
+def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary) -> None:
     light_grid(axes)
     if question.preferred:
         question = replace(question, cells=question.preferred)
@@ -67,13 +88,16 @@ def _draw(axes: Axes, name: str, question: QuestionSummary) -> None:
     cells = [cell for cell in question.cells if factor is None or factor in cell.levels]
     places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
     numeric = all(isinstance(level, float) for level in places)
-    for i, (label, some) in enumerate(_series(cells, factor).items()):
+    for i, (label, some) in enumerate(_series(cells, factor, found).items()):
         marks = sorted(_marks(question, some, factor, places), key=lambda mark: mark.x)
         _draw_series(axes, marks, i, label, joined=numeric, logarithmic=question.kind == "number")
-    _label(axes, name, question, factor, places)
+    labels = found.labels.get(factor or "", {})
+    names = [labels.get(shown_level(level), shown_level(level)) for level in places]  # the axis has the unit
+    _label(axes, name, question, factor)
+    _tick(axes, question, places, names)
 
 
-def _places(levels: Sequence[object]) -> dict[object, float]:
+def _places(levels: Sequence[Level]) -> dict[Level, float]:
     """Where each level stands: numbers at their value, words one after the other."""
     there = list(dict.fromkeys(levels))
     if len(there) > 1 and all(isinstance(level, float) for level in there):
@@ -81,17 +105,19 @@ def _places(levels: Sequence[object]) -> dict[object, float]:
     return {level: float(place) for place, level in enumerate(there)}
 
 
-def _series(cells: Sequence[ConditionSummary], factor: str | None) -> dict[str, list[ConditionSummary]]:
+def _series(
+    cells: Sequence[ConditionSummary], factor: str | None, design: DesignSummary
+) -> dict[str, list[ConditionSummary]]:
     """The conditions by the levels of the other factors."""
     found: dict[str, list[ConditionSummary]] = {}
     for cell in cells:
-        others = [display_name(level_words(name, level)) for name, level in cell.levels.items() if name != factor]
+        others = [drawn_name(design.label(name, level)) for name, level in cell.levels.items() if name != factor]
         found.setdefault(", ".join(others), []).append(cell)
     return found
 
 
 def _marks(
-    question: QuestionSummary, cells: Sequence[ConditionSummary], factor: str | None, places: Mapping[object, float]
+    question: QuestionSummary, cells: Sequence[ConditionSummary], factor: str | None, places: Mapping[Level, float]
 ) -> Iterator[MeanMark]:
     for cell in cells:
         if cell.mean is None:
@@ -113,15 +139,14 @@ def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, j
     if not marks:
         return
     aside = 0.0 if joined else 0.06 * (i - 0.5)  # marks of several series would hide each other
-    line: Any = METHOD_LINES[i % len(METHOD_LINES)] if joined else "none"
     axes.errorbar(
         [mark.x + aside for mark in marks],
         [mark.mean for mark in marks],
         yerr=[[mark.mean - mark.low for mark in marks], [mark.high - mark.mean for mark in marks]],
         color=method_colour(i),
-        marker=_MARKERS[i % len(_MARKERS)],
+        marker=method_marker(i),
         markersize=5.0,
-        linestyle=line,
+        linestyle=method_line(i) if joined else "none",
         capsize=2.5,
         linewidth=1.2,
         label=label or None,
@@ -134,10 +159,7 @@ def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, j
             axes.set_xscale("log")
 
 
-def _label(
-    axes: Axes, name: str, question: QuestionSummary, factor: str | None, places: Mapping[object, float]
-) -> None:
-    numeric = all(isinstance(level, float) for level in places) and len(places) > 1
+def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
     scored = any(cell.right is not None for cell in question.cells)
     share = "right [%]" if scored else "chosen [%]" if question.preferred else f"{name} [%]"
     axes.set_ylabel(share if question.kind in ("choice", "yes-no") else name)
@@ -147,21 +169,32 @@ def _label(
         reference_line(axes, 100.0 * question.chance, "chance")
     if question.kind in ("choice", "yes-no"):
         axes.set_ylim(-3.0, 103.0)
-    if len(places) <= _TICKS:
-        axes.set_xticks([*places.values()], [display_name(shown_level(level)) for level in places])  # type: ignore[arg-type]
+
+
+def _tick(axes: Axes, question: QuestionSummary, places: Mapping[Level, float], names: Sequence[str]) -> None:
+    """A tick with its name for each level, or of many numbers as matplotlib has them; then the legend."""
+    if len(places) == 1 or any(isinstance(level, str) for level in places):
+        name_ticks(axes, names, room_in=_panel_width(question))
+    elif len(places) <= _TICKS:
+        axes.set_xticks([*places.values()], [wrapped(name) for name in names])
         axes.xaxis.minorticks_off()
-    if not numeric:
-        axes.set_xlim(-0.6, len(places) - 0.4)
+    _add_legend(axes, question)
+
+
+def _add_legend(axes: Axes, question: QuestionSummary) -> None:
+    """The legend of several series, below the axis and the names there, where no mark can lie."""
     labels = axes.get_legend_handles_labels()[1]
-    if labels:  # below the axis, where no mark can lie
-        columns = min(len(labels), _LEGEND_COLUMNS)
-        others = ", ".join(factor_words(one) for one in _factors(question) if one != factor)
+    others = ", ".join(factor_words(one) for one in _factors(question) if one != _across(question))
+    if labels:
+        ticks = axes.get_xticklabels()
+        upright = any(tick.get_rotation() for tick in ticks)
+        lines = [text_columns(tick.get_text()) / 2.0 if upright else tick.get_text().count("\n") for tick in ticks]
         axes.legend(
             frameon=False,
             fontsize=8.0,
             title=others,
             title_fontsize=8.0,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.17),
-            ncols=columns,
+            bbox_to_anchor=(0.5, -0.17 - 0.06 * max([0.0, *lines])),
+            ncols=legend_columns(_panel_width(question), labels, _LEGEND_COLUMNS),
         )

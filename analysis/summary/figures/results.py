@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,18 +13,24 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 
 from analysis.report.figures.crowd import MANY, draw_histogram, draw_mean, draw_points, places
 from analysis.report.figures.style import (
     BLACK,
+    BLUE,
     DIRECTION_MARKERS,
+    MANY_METHODS,
+    VERMILION,
     bounded,
     drawn,
+    drawn_name,
     light_grid,
     method_colour,
+    name_ticks,
     reference_line,
     stars,
-    wrapped,
+    width_for,
 )
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import yes_no
@@ -75,6 +81,9 @@ def figure_8(statistics: StudyStatistics, path_stem: Path) -> None:
     if not panels:
         raise ValueError("figure 8 needs an experiment with at least one complete participant")
     widest = max(len(found[panel.experiment].methods) for panel in panels)
+    if widest > MANY_METHODS:
+        _draw_stacked(panels, found, path_stem)
+        return
     height_in = 4.5 + 0.16 * max(0, widest * (widest - 1) // 2 - 3)
     with drawn(path_stem, 0.4 + (0.9 + max(widest, 3)) * len(panels), height_in) as figure:
         row = figure.subplots(1, len(panels), squeeze=False)[0]
@@ -82,18 +91,64 @@ def figure_8(statistics: StudyStatistics, path_stem: Path) -> None:
             _draw_panel(axes, panel, found[panel.experiment], chr(ord("a") + i))
 
 
+def has_matrix(found: WithinStatistics) -> bool:
+    """Whether a matrix shows which methods differ, as there are too many of them for brackets."""
+    return bool(found.tukey) and len(found.methods) > MANY_METHODS
+
+
+_ROW_IN = 0.3
+_MOST_TEXTS = 30
+"""Of more methods the matrix shows colours alone."""
+
+
+def _draw_stacked(panels: Sequence[_Panel], found: Mapping[str, WithinStatistics], path_stem: Path) -> None:
+    """The panels one above the other, below each the matrix of its comparisons, whose columns are the bars'."""
+    shown = [(panel, found[panel.experiment]) for panel in panels]
+    tall = [height for _, one in shown for height in (3.6, *((_ROW_IN * len(one.methods),) if has_matrix(one) else ()))]
+    width = width_for(max(len(one.methods) for _, one in shown))
+    with drawn(path_stem, width, sum(tall) + 0.7 * len(shown)) as figure:
+        rows = iter(figure.subplots(len(tall), 1, squeeze=False, height_ratios=tall)[:, 0])
+        for i, (panel, one) in enumerate(shown):
+            _draw_panel(next(rows), panel, one, chr(ord("a") + i))
+            if has_matrix(one):
+                _draw_matrix(next(rows), one)
+
+
+_SHADES = {"***": 0.75, "**": 0.5, "*": 0.25}
+
+
+def _draw_matrix(axes: Axes, found: WithinStatistics) -> None:
+    """A cell a pair: the sign says whether the row's mean is above (+) the column's, stars how surely."""
+    methods, few = found.methods, len(found.methods) <= _MOST_TEXTS
+    for pair in found.tukey or ():
+        row, column, text = *sorted((methods.index(pair.a), methods.index(pair.b)), reverse=True), stars(pair.p)
+        above = found.means[methods[row]] > found.means[methods[column]]
+        colour = to_rgba(BLUE if above else VERMILION, _SHADES.get(text, 0.0))
+        axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, facecolor=colour, edgecolor="#cccccc", lw=0.5))
+        differs = text in _SHADES
+        shown = f"{'+' if above else '−'}{text}" if differs else text
+        if few and not math.isnan(pair.p):
+            axes.text(column, row, shown, ha="center", va="center", fontsize=7.5, color=BLACK if differs else "#777777")
+    axes.set_xlim(-0.6, len(methods) - 0.4)
+    axes.set_ylim(len(methods) - 0.5, 0.5)
+    axes.set_yticks(range(1, len(methods)), [drawn_name(method) for method in methods[1:]], fontsize=8.0)
+    axes.set_xticks([])
+    axes.tick_params(length=0.0)
+    axes.spines[:].set_visible(False)
+
+
 def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, letter: str) -> None:
     methods = found.methods
     light_grid(axes)
-    axes.set_xlim(-0.6, len(methods) - 0.4)
     if panel.chance is not None:
         reference_line(axes, panel.chance, "chance")
     ceiling = max(_draw_bars(axes, panel, found, methods), _draw_people(axes, panel, found, methods))
-    highest = _draw_brackets(axes, found.tukey or (), methods, ceiling, 0.075 * panel.top)
+    pairs = () if has_matrix(found) else found.tukey or ()
+    highest = _draw_brackets(axes, pairs, methods, ceiling, 0.075 * panel.top) if pairs else ceiling
     axes.set_ylim(0.0, max(highest, panel.top) + 0.04 * panel.top)
     axes.set_yticks(np.linspace(0.0, panel.top, 6))
     bounded(axes, 0.0, panel.top)
-    axes.set_xticks(range(len(methods)), [wrapped(method) for method in methods])
+    name_ticks(axes, methods)
     axes.set_xlabel(found.people, fontsize=8.0, labelpad=8.0)
     axes.set_ylabel(panel.label)
     axes.set_title(f"({letter}) {panel.title}", loc="left", fontweight="bold")
@@ -178,11 +233,15 @@ def figure_directions(found: DirectionStatistics, path_stem: Path) -> None:
     and criterion are undefined: without any of them their panels are left out.
     """
     measures = _MEASURES if any(found.sensitivity.values()) else ()
-    with drawn(path_stem, max(8.0, 0.8 + 2.2 * len(found.methods)), 7.6 if measures else 4.2) as figure:
-        rows = figure.add_gridspec(2 if measures else 1, 2)
+    many = len(found.methods) > MANY_METHODS
+    width = 0.8 + 1.1 * len(found.methods) if many else max(8.0, 0.8 + 2.2 * len(found.methods))
+    panels = (1 + len(measures)) if many else 2 if measures else 1
+    with drawn(path_stem, min(width, width_for(99)), 3.8 * panels if panels > 1 else 4.2) as figure:
+        rows = figure.add_gridspec(panels, 1 if many else 2)
         _draw_rates(figure.add_subplot(rows[0, :]), found)
         for i, measure in enumerate(measures):
-            _draw_measure(figure.add_subplot(rows[1, i]), found, measure, chr(ord("b") + i))
+            place = rows[1 + i, :] if many else rows[1, i]
+            _draw_measure(figure.add_subplot(place), found, measure, chr(ord("b") + i))
         _explain(figure, found)
 
 
@@ -274,8 +333,7 @@ def _largest_d_prime(found: DirectionStatistics) -> float | None:
 
 def _frame(axes: Axes, methods: Sequence[str], title: str, label: str) -> None:
     light_grid(axes)
-    axes.set_xlim(-0.6, len(methods) - 0.4)
-    axes.set_xticks(range(len(methods)), [wrapped(method) for method in methods])
+    name_ticks(axes, methods)
     axes.set_title(title, loc="left", fontweight="bold")
     axes.set_ylabel(label)
 

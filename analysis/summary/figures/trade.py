@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,13 +19,17 @@ from analysis.report.figures.style import (
     BLACK,
     DIRECTION_MARKERS,
     INK,
-    METHOD_LINES,
-    display_name,
+    MANY_METHODS,
     drawn,
+    drawn_name,
+    legend_columns,
     light_grid,
     method_colour,
+    method_line,
+    method_marker,
+    name_ticks,
     reference_line,
-    wrapped,
+    width_for,
 )
 from analysis.summary.results import DirectionStatistics
 from analysis.times.own_trials import ResponseTimes
@@ -34,7 +38,6 @@ from analysis.times.speed_accuracy import CellTrade, NoSpeedAccuracy, SpeedAccur
 _Cells = Sequence[tuple[int, CellTrade]]
 """One instruction's cells, each with the place of its method, which has its colour and mark from there."""
 
-_MARKERS = ("o", "s", "D", "^", "v", "P", "X")
 _ACROSS = 3
 """So many panels stand side by side."""
 
@@ -96,7 +99,11 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
     instructions = [i for i in trade.instructions if any(i in one for one in trade.methods.values())]
     columns = min(_ACROSS, len(instructions))
     rows = -(-len(instructions) // columns)
-    with drawn(path_stem, 5.8 if columns == 1 else 0.6 + 3.3 * columns, 0.5 + 3.7 * rows) as figure:
+    shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
+    width = 5.8 if columns == 1 else 0.6 + 3.3 * columns
+    across = legend_columns(width, [drawn_name(method) for _, method in shown])
+    legend_rows = -(-len(shown) // across)
+    with drawn(path_stem, width, 0.5 + 3.7 * rows + 0.19 * (legend_rows - 1)) as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for spare in grid[len(instructions) :]:
             spare.set_visible(False)
@@ -111,8 +118,8 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
                 title = textwrap.shorten(f"({chr(ord('a') + k)}) {instruction}", 36, placeholder=" ...")
                 axes.set_title(title, loc="left", fontweight="bold", parse_math=False)
         panel.limit(grid[0], trade)
-        shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
-        figure.legend(handles=_handles(shown, lines=panel.lines), loc="outside upper center", ncols=3, frameon=False)
+        handles, long = _handles(shown, lines=panel.lines), 4.5 if len(shown) > MANY_METHODS else None
+        figure.legend(handles=handles, loc="outside upper center", ncols=across, frameon=False, handlelength=long)
 
 
 def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
@@ -122,10 +129,10 @@ def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]
             [],
             [],
             color=method_colour(i),
-            linestyle=METHOD_LINES[i % len(METHOD_LINES)] if lines else "none",  # type: ignore[arg-type]
-            marker=_MARKERS[i % len(_MARKERS)],
+            linestyle=method_line(i) if lines else "none",
+            marker=method_marker(i),
             markersize=5.5,
-            label=display_name(method),
+            label=drawn_name(method),
         )
         for i, method in methods
     ]
@@ -139,8 +146,8 @@ def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
                 curve.mean_time_s,
                 100.0 * np.array(curve.accuracy),
                 color=method_colour(i),
-                linestyle=METHOD_LINES[i % len(METHOD_LINES)],
-                marker=_MARKERS[i % len(_MARKERS)],
+                linestyle=method_line(i),
+                marker=method_marker(i),
                 markersize=5.5,
                 linewidth=1.7,
                 zorder=3.0,
@@ -168,7 +175,7 @@ def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
                     [probability] * len(quantiles),
                     quantiles,
                     linestyle="none",
-                    marker=_MARKERS[i % len(_MARKERS)],
+                    marker=method_marker(i),
                     markersize=5.5,
                     mfc=fill,
                     mec=method_colour(i),
@@ -235,11 +242,12 @@ def figure_response_times(found: DirectionStatistics, path_stem: Path) -> None:
     times = found.response_times
     if not times.n:
         raise ValueError("the figure of response times needs at least one valid time")
-    with drawn(path_stem, 8.6 + 1.6 * max(0, len(found.methods) - 3), 3.9) as figure:
-        left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
-        limit = _limit(times)
-        _draw_shares(left, times, found.methods, limit)
-        _draw_boxes(right, times, found.methods)
+    many = len(found.methods) > MANY_METHODS
+    width = width_for(len(found.methods)) if many else 8.6 + 1.6 * max(0, len(found.methods) - 3)
+    with drawn(path_stem, width, 8.2 if many else 3.9) as figure:
+        one, other = figure.subplots(2, 1) if many else figure.subplots(1, 2, width_ratios=[1.0, 1.15])
+        _draw_shares(one, times, found.methods, _limit(times))
+        _draw_boxes(other, times, found.methods)
 
 
 def _limit(times: ResponseTimes) -> float:
@@ -254,8 +262,8 @@ def _draw_shares(axes: Axes, times: ResponseTimes, methods: Sequence[str], limit
     for i, method in enumerate(methods):
         spread = times.methods.get(method)
         if spread:
-            label = f"{display_name(method)} (n = {spread.n:,})"
-            line = METHOD_LINES[i % len(METHOD_LINES)]
+            label = f"{drawn_name(method)} (n = {spread.n:,})"
+            line = method_line(i)
             shares = np.arange(len(spread.percentiles))
             axes.plot(spread.percentiles, shares, color=method_colour(i), linestyle=line, linewidth=1.7, label=label)
             slowest = max(slowest, spread.percentiles[-1])
@@ -265,7 +273,8 @@ def _draw_shares(axes: Axes, times: ResponseTimes, methods: Sequence[str], limit
     axes.set_xlabel(f"response time [s]{beyond}")
     axes.set_ylabel("share of the trials answered by then [%]")
     axes.set_title("(a) Cumulative distribution", loc="left", fontweight="bold")
-    axes.legend(loc="best", fontsize=8.0, handlelength=3.2, framealpha=0.9)
+    place: Any = "lower right" if len(methods) > MANY_METHODS else "best"
+    axes.legend(loc=place, ncols=1 + len(methods) // 14, fontsize=8.0, handlelength=3.2, framealpha=0.9)
 
 
 def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> None:
@@ -276,17 +285,20 @@ def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> Non
             if spread:
                 _draw_box(axes, i + place, spread.percentiles, method_colour(i), filled=direction == "forward")
                 _draw_medians(axes, i + place, times, method, direction)
-    axes.set_xlim(-0.6, len(methods) - 0.4)
     axes.set_ylim(bottom=0.0)
-    axes.set_xticks(range(len(methods)), [f"{_counts(times, m)}\n{wrapped(m)}" for m in methods])
-    axes.set_xlabel(f"boxes: 5, 25, 50, 75 and 95 % of the trials{_medians_note(times)}", fontsize=8.0, labelpad=8.0)
+    counted = "" if len(methods) > MANY_METHODS else "n = "
+    name_ticks(axes, methods, [counted + _counts(times, m) for m in methods])
+    counts = "above the names: forward and backward trials; " if len(methods) > MANY_METHODS else ""
+    note = f"{counts}boxes: 5, 25, 50, 75 and 95 % of the trials{_medians_note(times)}"
+    axes.set_xlabel(note, fontsize=8.0, labelpad=8.0)
     axes.set_ylabel("response time [s]")
     axes.set_title("(b) By direction", loc="left", fontweight="bold")
     handles = [
         Patch(facecolor="#bbbbbb", edgecolor=BLACK, label="forward shots"),
         Patch(facecolor="white", edgecolor=BLACK, label="backward shots"),
     ]
-    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8.0)
+    beside: Any = {"loc": "lower right", "bbox_to_anchor": (1.02, 1.0), "borderpad": 0.2, "columnspacing": 1.0}
+    axes.legend(handles=handles, ncols=2, frameon=False, fontsize=8.0, handlelength=1.6, **beside)
 
 
 def _draw_box(axes: Axes, place: float, percentiles: Sequence[float], colour: str, *, filled: bool) -> None:
@@ -318,7 +330,7 @@ def _draw_medians(axes: Axes, place: float, times: ResponseTimes, method: str, d
 
 def _counts(times: ResponseTimes, method: str) -> str:
     spreads = times.directions.get(method, {})
-    return "n = " + " / ".join(f"{spreads[d].n if d in spreads else 0:,}" for d in _PLACES)
+    return " / ".join(f"{spreads[d].n if d in spreads else 0:,}" for d in _PLACES)
 
 
 def _medians_note(times: ResponseTimes) -> str:

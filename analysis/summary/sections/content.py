@@ -11,7 +11,7 @@ from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report.figures.shot import ShotPanel
 from analysis.report.section import Section
-from analysis.summary.results import StudyStatistics
+from analysis.summary.results import StudyStatistics, WithinStatistics
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 
@@ -41,3 +41,12 @@ class ReportData:
     extra: tuple[Section, ...] = ()
     reconstructed: bool = False
     apart: tuple[ReportData, ...] = ()
+
+
+_SPELLED_OUT = 4
+"""Of more methods sentences give counts and ends; all of them stand in tables."""
+
+
+def has_many(found: WithinStatistics) -> bool:
+    """Whether there are too many methods to name each of them, and each pair, in a sentence."""
+    return len(found.methods) > _SPELLED_OUT

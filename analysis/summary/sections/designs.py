@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from analysis.report import apa
-from analysis.report.figures.style import named
+from analysis.report.labels import display_name, named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, QuestionSummary
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import figure_of
-from experiments.design.language import shown_level
-from experiments.design.methods_section import factor_words, level_words
+from experiments.design.language import Level
+from experiments.design.methods_section import factor_words
 
 _TESTS = {
     "anova": "ANOVA, F",
@@ -41,7 +41,7 @@ def _design_section(name: str, found: DesignSummary) -> Section:
         title=found.title or name.capitalize(),
         paragraphs=(_factors(found), *_assumed(found), *_words(found)),
         pictures=(_picture(name, found),) if any(question.cells for question in found.questions.values()) else (),
-        tables=tuple(table for asked, question in found.questions.items() for table in _tables(asked, question)),
+        tables=tuple(table for asked, question in found.questions.items() for table in _tables(found, asked, question)),
     )
 
 
@@ -64,18 +64,18 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
     people = f"{found.n:,} {'synthetic ' if found.origin.synthetic else ''}participant{'' if found.n == 1 else 's'}"
     for asked, question in found.questions.items():
         if question.cells:
-            told = " ".join([_cells_words(question), *_tests_words(question, exact=exact)])
+            told = " ".join([_cells_words(found, question), *_tests_words(question, exact=exact)])
             yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 
-def _cells_words(question: QuestionSummary) -> str:
+def _cells_words(found: DesignSummary, question: QuestionSummary) -> str:
     cells = question.preferred or question.cells
-    shown = [f"{_condition(question, cell)} {_mean_and_spread(question, cell)}" for cell in cells]
+    shown = [f"{_condition(found, question, cell)} {_mean_and_spread(question, cell)}" for cell in cells]
     if len(shown) > _TOLD:
         ends = sorted(cells, key=lambda cell: (cell.mean is None, cell.mean or 0.0))
         ends = [cell for cell in ends if cell.mean is not None] or ends
         low, high = (
-            f"{_mean_and_spread(question, cell)} ({_condition(question, cell)})" for cell in (ends[0], ends[-1])
+            f"{_mean_and_spread(question, cell)} ({_condition(found, question, cell)})" for cell in (ends[0], ends[-1])
         )
         return f"{_mean_word(question)} of {len(cells)} conditions went from {low} to {high}."
     return f"{_mean_word(question)}: {'; '.join(shown)}."
@@ -146,8 +146,12 @@ def effect_words(effect: str) -> str:
 
 def _factors(found: DesignSummary) -> str:
     varied = {name: levels for name, levels in found.factors.items() if len(levels) > 1}
-    said = "; ".join(f"{factor_words(name)}: {', '.join(map(shown_level, levels))}" for name, levels in varied.items())
-    return f"What varied: {named(said)}." if said else "Nothing varied."
+    said = "; ".join(f"{factor_words(name)}: {_listed(found, name, levels)}" for name, levels in varied.items())
+    return f"What varied: {said}." if said else "Nothing varied."
+
+
+def _listed(found: DesignSummary, name: str, levels: Sequence[Level]) -> str:
+    return ", ".join(display_name(found.label(name, level)) for level in levels)
 
 
 def _assumed(found: DesignSummary) -> tuple[str, ...]:
@@ -173,19 +177,25 @@ def _picture(name: str, found: DesignSummary) -> Picture:
     parts = ["the exact 95 % interval of all trials together"] if scored else []
     parts += ["the SD between participants"] if len(scored) < len(found.questions) else []
     spread = f"Whiskers: {' of right answers, else '.join(parts)}."
-    means = "; ".join(
-        f"{asked}: {', '.join(f'{_condition(question, cell)} {_mean(question, cell)}' for cell in question.cells)}"
-        for asked, question in found.questions.items()
-    )
+    means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in found.questions.items())
     return Picture(
         stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}. {spread}", alt=f"Means by condition. {means}"
     )
 
 
-def _condition(question: QuestionSummary, cell: ConditionSummary) -> str:
-    """The levels of a condition; a number with its unit, or the name of its factor."""
-    levels = (level_words(name, level) for name, level in cell.levels.items())
-    return named(", ".join(levels)) or ("catch trials" if len(question.cells) > 1 else "all trials")
+_SPELLED_OUT = 12
+
+
+def _means(found: DesignSummary, question: QuestionSummary) -> str:
+    told = [f"{_condition(found, question, cell)} {_mean(question, cell)}" for cell in question.cells[:_SPELLED_OUT]]
+    more = len(question.cells) - len(told)
+    return ", ".join(told) + (f" and {more} more conditions" if more else "")
+
+
+def _condition(found: DesignSummary, question: QuestionSummary, cell: ConditionSummary) -> str:
+    """The levels of a condition, by what they are called."""
+    levels = (display_name(found.label(name, level)) for name, level in cell.levels.items())
+    return ", ".join(levels) or ("catch trials" if len(question.cells) > 1 else "all trials")
 
 
 def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
@@ -194,20 +204,20 @@ def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
     return apa.percent(cell.mean) if question.kind in ("choice", "yes-no") else apa.number(cell.mean)
 
 
-def _tables(name: str, question: QuestionSummary) -> Iterator[Table]:
+def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Iterator[Table]:
     if question.preferred:
-        yield _conditions(f"{name}: how often each was chosen,", replace(question, cells=question.preferred))
+        yield _conditions(found, f"{name}: how often each was chosen,", replace(question, cells=question.preferred))
     if question.cells:
         named_scale = f"{name} ({question.scale})" if question.scale else name
-        yield _conditions(named_scale, replace(question, preferred=None))
+        yield _conditions(found, named_scale, replace(question, preferred=None))
     if question.tests:
         header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval", "Standing")
-        rows = tuple((*_test(test), _standing(question, test)) for test in question.tests)
+        rows = tuple((*_test(found, test), _standing(question, test)) for test in question.tests)
         note = f"; {_PLANNED}" if any(row[-1] == "planned" for row in rows) else ""
         yield Table(caption=f"{name}: tests{note}", header=header, rows=rows)
 
 
-def _conditions(name: str, question: QuestionSummary) -> Table:
+def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> Table:
     factors = list(dict.fromkeys(factor for cell in question.cells for factor in cell.levels))
     scored = any(cell.right is not None for cell in question.cells)
     sd = "SD of ln" if question.kind == "number" else "SD"
@@ -215,7 +225,7 @@ def _conditions(name: str, question: QuestionSummary) -> Table:
     answers = () if question.preferred is not None else tuple(next(iter(question.cells)).answers or ())
     rows = tuple(
         (
-            *(_level(cell, factor) for factor in factors),
+            *(_level(found, cell, factor) for factor in factors),
             str(cell.people),
             str(cell.trials),
             *(str((cell.answers or {})[answer]) for answer in answers),
@@ -230,8 +240,8 @@ def _conditions(name: str, question: QuestionSummary) -> Table:
     return Table(caption=f"{name} by condition", header=header, rows=rows)
 
 
-def _level(cell: ConditionSummary, factor: str) -> str:
-    return named(shown_level(cell.levels[factor])) if factor in cell.levels else "catch trials"
+def _level(found: DesignSummary, cell: ConditionSummary, factor: str) -> str:
+    return display_name(found.label(factor, cell.levels[factor])) if factor in cell.levels else "catch trials"
 
 
 def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) -> tuple[str, ...]:
@@ -241,7 +251,7 @@ def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) 
     return f"{low} to {high}", apa.p_cell(cell.p)
 
 
-def _test(test: DesignTest) -> tuple[str, ...]:
+def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:
     df = ", ".join(map(str, test.df)) if test.df else apa.NO_NUMBER
     if test.reason:
         more = test.reason
@@ -250,4 +260,12 @@ def _test(test: DesignTest) -> tuple[str, ...]:
     else:
         more = apa.NO_NUMBER if test.size is None else f"η²_G = {apa.below_one(test.size)}"
     p = apa.NO_NUMBER if test.p is None else apa.p_cell(test.p)
-    return (_TESTS.get(test.name, test.name), effect_words(test.effect), apa.number(test.statistic), df, p, more)
+    return (_TESTS.get(test.name, test.name), _effect(found, test), apa.number(test.statistic), df, p, more)
+
+
+def _effect(found: DesignSummary, test: DesignTest) -> str:
+    """What was tested; of a pair both levels by what they are called."""
+    if test.name != "tukey":
+        return effect_words(test.effect)
+    labels = {level: label for of in found.labels.values() for level, label in of.items()}
+    return " – ".join(display_name(labels.get(level, level)) for level in test.effect.split(" – "))

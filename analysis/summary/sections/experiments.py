@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
+from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
-from analysis.report.figures.style import display_name
+from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
 from analysis.stats.paired import PairedT
 from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
-from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.content import ReportData, has_many
 from analysis.summary.sections.pictures import directions_picture
 
 
@@ -76,7 +77,13 @@ def _means_words(found: WithinStatistics, printed: PrintedMeasure) -> str:
     if found.n == 1:
         values = ", ".join(f"{display_name(m)} {printed.value(found.means[m])}" for m in found.methods)
         return f"{printed.words[:1].upper()}{printed.words[1:]} of {found.people}: {values}."
-    means = ", ".join(f"{display_name(m)} {printed.mean(found.means[m], found.sds[m])}" for m in found.methods)
+    told = {m: f"{display_name(m)} {printed.mean(found.means[m], found.sds[m])}" for m in found.methods}
+    if has_many(found):
+        low, high = (told[end(found.methods, key=found.means.__getitem__)] for end in (min, max))
+        return (
+            f"Means (SD) of {printed.words}, {found.people}, went from {low} to {high}; the table has all {len(told)}."
+        )
+    means = ", ".join(told.values())
     return f"Means (SD) of {printed.words}, {found.people}: {means}."
 
 
@@ -96,6 +103,11 @@ def pairs_sentence(found: WithinStatistics, experiment: str, *, full: bool = Fal
     """The planned comparisons; empty where nothing was tested. `full`: with intervals, the exact p and d_z."""
     if not found.tukey or found.supplement is None:
         return ""
+    if has_many(found):
+        differing = sum(pair.p < SIGNIFICANT for pair in found.tukey)
+        return (
+            f"Planned comparisons (Tukey's HSD): of {len(found.tukey)} pairs {differing} differed; the table has all."
+        )
     tests = zip(found.tukey, found.supplement.paired_t, strict=True)
     pairs = "; ".join(_pair_words(pair, _tested(pair, t, experiment, full=full)) for pair, t in tests)
     note = ", 95 % CIs simultaneous" if full else ""
@@ -276,6 +288,10 @@ def _binomial_sentence(found: DirectionStatistics) -> str:
         for method, directions in found.binomial.items()
         for direction, test in directions.items()
     ]
+    if has_many(found):
+        away = sum(significant for significant, _ in tests)
+        told = f"of {len(tests)} rates {away} differed significantly from 50 %; the table has all"
+        return f"Exact binomial tests of the correct rates: {told}."
     parts = []
     for differs, words in ((False, "no significant difference from 50 %"), (True, "a significant one from 50 %")):
         shown = "; ".join(text for significant, text in tests if significant is differs)

@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterator
 
 from analysis.report import apa
-from analysis.report.figures.style import display_name
+from analysis.report.labels import display_name
 from analysis.report.section import Section
 from analysis.summary.results import DesignSummary, DirectionStatistics, StudyStatistics, WithinStatistics
-from analysis.summary.sections.content import EXPERIMENTS, ReportData
+from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
 from analysis.summary.sections.designs import result_sentences
 from analysis.summary.sections.experiments import effect_sentence, pairs_sentence
 from analysis.summary.sections.participants import how_many
@@ -86,6 +86,8 @@ def _analysis(found: WithinStatistics) -> str:
 
 def _guessing(found: WithinStatistics) -> str:
     if not isinstance(found, DirectionStatistics):
+        return ""
+    if has_many(found):
         return ""
     tests = "; ".join(
         f"{display_name(method)} {way} {apa.percent(test.estimate)} ({test.successes:,} of {test.trials:,}), "

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
-from analysis.report.figures.style import named
+from analysis.report.labels import display_name
 from analysis.report.section import Picture
 from analysis.summary.figures.designs import figure_design
-from analysis.summary.figures.results import figure_8, figure_directions
+from analysis.summary.figures.results import figure_8, figure_directions, has_matrix
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
@@ -18,7 +19,7 @@ from analysis.summary.figures.trade import (
     has_points,
 )
 from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
-from analysis.summary.sections.content import EXPERIMENTS, ReportData
+from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
 from analysis.times.own_trials import TimeSpread
 from experiments.record.tables import is_rated
 
@@ -67,7 +68,9 @@ def results_picture(statistics: StudyStatistics, *, compared: bool) -> Picture:
     counts = "; ".join(f"{EXPERIMENTS[name]}, {found.people}" for name, found in shown.items())
     largest = max(found.n for found in shown.values())
     tested = any(found.tukey for found in shown.values())
-    brackets = f" Brackets: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
+    matrix = any(map(has_matrix, shown.values()))
+    shown_by = "Matrix, + where the row's mean is above the column's" if matrix else "Brackets"
+    brackets = f" {shown_by}: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
     opening = f"As in the paper's Figure 8: {counts}" if compared else f"{counts[:1].upper()}{counts[1:]}"
     caption = (
         f"{opening}. Bars{' and whiskers: mean and SD between' if largest > 1 else ': the values of the'} participants"
@@ -85,13 +88,23 @@ def _crowd_words(largest: int) -> str:
     return "Points: participants, each at the same place in every bar; thin lines join the values of one."
 
 
+_SPELLED_OUT = 4
+
+
 def _means_words(found: WithinStatistics, experiment: str) -> str:
     shown = apa.number if is_rated(experiment) else apa.percent
-    return ", ".join(f"{named(method)} {shown(mean)}" for method, mean in found.means.items())
+    told = {method: f"{display_name(method)} {shown(mean)}" for method, mean in found.means.items()}
+    if not has_many(found):
+        return ", ".join(told.values())
+    lowest, highest = (told[end(found.methods, key=found.means.__getitem__)] for end in (min, max))
+    return f"{len(told)} methods, from {lowest} to {highest}"
 
 
 def _tests_words(found: WithinStatistics, experiment: str) -> str:
-    pairs = "; ".join(f"{named(c.a)} against {named(c.b)} {apa.p_value(c.p)}" for c in found.tukey or ())
+    if has_many(found):
+        differing = sum(pair.p < SIGNIFICANT for pair in found.tukey or ())
+        return f"Tukey's tests, {EXPERIMENTS[experiment]}: {differing} of {len(found.tukey or ())} pairs differ."
+    pairs = "; ".join(f"{display_name(c.a)} against {display_name(c.b)} {apa.p_value(c.p)}" for c in found.tukey or ())
     return f"Tukey's tests, {EXPERIMENTS[experiment]}: {pairs}." if pairs else ""
 
 
@@ -102,7 +115,8 @@ def directions_picture(found: DirectionStatistics) -> Picture:
         f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. Large marks and "
         f"whiskers: mean and SD. {_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
     )
-    rates = "; ".join(_rates_words(found, method) for method in found.methods)
+    rates = "; ".join(_rates_words(found, method) for method in found.methods[:_SPELLED_OUT])
+    rates += f"; and {len(found.methods) - _SPELLED_OUT} more methods" if has_many(found) else ""
     alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
     return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
 
@@ -115,7 +129,7 @@ def _direction_crowd(n: int) -> str:
 
 def _rates_words(found: DirectionStatistics, method: str) -> str:
     forward, backward = found.means[method], found.backward.means.get(method)
-    rates = f"{named(method)} {apa.percent(forward)} forward, {apa.percent(backward)} backward"
+    rates = f"{display_name(method)} {apa.percent(forward)} forward, {apa.percent(backward)} backward"
     return rates + _sensitivity_words(found.sensitivity[method])
 
 
@@ -136,14 +150,16 @@ def response_times_picture(found: DirectionStatistics) -> Picture | None:
         f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
         f"whiskers: 5 and 95 %.{medians}"
     )
-    spreads = "; ".join(_spread_words(method, spread) for method, spread in times.methods.items() if spread)
+    known = [(method, spread) for method, spread in times.methods.items() if spread]
+    spreads = "; ".join(_spread_words(method, spread) for method, spread in known[:_SPELLED_OUT])
+    spreads += f"; and {len(known) - _SPELLED_OUT} more methods" if len(known) > _SPELLED_OUT else ""
     alt = f"Cumulative distributions and box plots of the response times. {spreads}."
     return Picture(stem=_TIMES_FIGURE, caption=caption, alt=alt)
 
 
 def _spread_words(method: str, spread: TimeSpread) -> str:
     low, median, high = (apa.number(spread.percentiles[at]) for at in (25, 50, 75))
-    return f"{named(method)} median {median} s, quartiles {low} and {high} s"
+    return f"{display_name(method)} median {median} s, quartiles {low} and {high} s"
 
 
 def shot_picture(panels: tuple[ShotPanel, ...], *, compared: bool) -> Picture:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from analysis.paper.paper import AUDITED, ComparisonRow
 from analysis.report import apa
-from analysis.report.figures.style import named
+from analysis.report.labels import named
 from analysis.report.section import Section, Table
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.pictures import shot_picture

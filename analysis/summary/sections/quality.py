@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from analysis.report.figures.style import display_name, named
+from analysis.report.labels import display_name, named
 from analysis.report.section import Section, Table, shortened
 from analysis.stats.diagnostics import OUTLIER_RULE
 from analysis.summary.results import WithinStatistics

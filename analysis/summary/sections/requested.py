@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from analysis.report import apa
-from analysis.report.figures.style import named
+from analysis.report.labels import named
 from analysis.report.section import Section, Table
 from analysis.stats.anova_bayes import AnovaBayesFactor
 from analysis.stats.contrasts import PlannedContrast

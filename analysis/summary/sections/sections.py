@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
+from analysis.report.labels import labelled
 from analysis.report.page import write_page
-from analysis.report.section import PageHead, PageNotice, Section, Table, shortened
+from analysis.report.section import PageHead, PageNotice, Section, Table, names_in_full, shortened
 from analysis.report.serial import as_json
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import sections_of_designs
@@ -22,6 +24,7 @@ from analysis.summary.sections.quality import quality_section, undefined_numbers
 from analysis.summary.sections.requested import requested_sections
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_details, trade_sections
+from experiments.record import storage
 
 STATISTICS = "statistics.json"
 
@@ -47,7 +50,7 @@ def _provenance(report: ReportData) -> Iterator[Section]:
 def _log_files(report: ReportData) -> Iterator[Section]:
     names = shown_names(report)
     if report.files:
-        listed = shortened([names[file].as_posix() for file in report.files], "log files")
+        listed = shortened([shown_name(names[file].as_posix()) for file in report.files], "log files")
         yield Section(title="Log files", items=listed, appendix=True, folded=True)
 
 
@@ -103,10 +106,13 @@ def write_report(out: Path, report: ReportData) -> None:
 
     Files of an earlier report there are replaced. The same data give the same bytes.
     """
-    out.mkdir(parents=True, exist_ok=True)
-    write_figures(out / "figures", report)
-    for one in report.apart:
-        write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
+    storage.make_folder(out)
+    methods = [method for one in report.statistics.analysed.values() for method in one.methods]
     head = PageHead(notices=(*notices(report), *_notices_of_kept_apart(report)), files=(STATISTICS, *report.beside))
-    write_page(out, report.title, sections(report), head)
-    (out / STATISTICS).write_bytes(as_json(report.statistics))
+    with labelled(report.statistics.labels or {}, methods):
+        write_figures(out / "figures", report)
+        for one in report.apart:
+            write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
+        parts = sections(report)
+        write_page(out, report.title, (*parts, *names_in_full()), head)
+    storage.write_whole(out / STATISTICS, as_json(report.statistics))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from analysis.report import apa
-from analysis.report.figures.style import display_name, named
+from analysis.report.labels import display_name, named
 from analysis.report.section import Section, Table
 from analysis.stats.diagnostics import Sphericity
 from analysis.stats.logit_model import Contrast

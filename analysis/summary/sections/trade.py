@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from analysis.report import apa
-from analysis.report.figures.style import display_name, named
+from analysis.report.labels import display_name
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.figures.trade import has_curve, has_points
 from analysis.summary.results import DirectionStatistics
@@ -173,7 +173,8 @@ def _parameter(name: str) -> str:
     >>> _parameter("drift asymmetric-1"), _parameter("start")
     ('drift Asymmetric Force I', 'start (towards forward)')
     """
-    return _WORDS.get(name, named(name))
+    kind, _, of = name.partition(" ")
+    return _WORDS.get(name, f"drift {display_name(of)}" if kind == "drift" else name)
 
 
 TITLE = "Speed and accuracy"
