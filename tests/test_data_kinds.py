@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import recoil as public
 from analysis.logs.reading import read_logs
 from analysis.stats.anova import rm_anova
 from analysis.summary.summary import summarize
@@ -137,6 +138,14 @@ def test_each_kinds_f_is_that_of_its_own_people(mixed: Path) -> None:
     )
     np.testing.assert_allclose(synthetic.anova.F, rm_anova(scores).F, rtol=1e-12)
     assert sorted({str(row["data"]) for row in found.rows()}) == ["real", "simulated gun", "synthetic"]
+
+
+def test_a_notebook_is_told_the_argument(mixed: Path) -> None:
+    found = public.analyze(mixed)
+    assert {one.remedy for one in found.excluded} == {"`include_synthetic=True`"}
+    assert (found.data_kind, found.kept_apart) == ("real", None)
+    assert sum("include_synthetic=True" in warning for warning in found.warnings) == 8
+    assert set(public.analyze(mixed, include_synthetic=True).kept_apart or {}) == {"simulated gun", "synthetic"}
 
 
 def is_forward(row: dict[str, str], method: str) -> bool:

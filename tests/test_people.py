@@ -56,6 +56,7 @@ def test_a_time_of_day_has_hours_and_minutes() -> None:
         (RunProgress(experiment="direction", state="not begun", practised=True), "–\npractice done"),
         (RunProgress(experiment="direction", state="done", answered=60, planned=60, last_utc="x"), "done"),
         (RunProgress(experiment="direction", state="unreadable"), "cannot be read"),
+        (RunProgress(experiment="direction", state="synthetic"), "synthetic"),
         (RunProgress(experiment="direction", state="open elsewhere"), "open elsewhere"),
     ],
 )
@@ -80,6 +81,12 @@ def test_an_exclusion_is_a_note() -> None:
     [
         (("not begun", "not begun"), "direction", "P01 has not begun.", "good"),
         (("done", "not begun"), "preference", "P01 has done direction.", "good"),
+        (
+            ("synthetic", "not begun"),
+            "direction",
+            "A synthetic participant did direction as P01; that run is set aside when P01 begins.",
+            "good",
+        ),
         (("done", "not begun"), "direction", "P01 has done direction.", "bad"),
         (("done", "done"), "direction", "P01 has done everything.", "bad"),
         (("open elsewhere", "not begun"), "direction", "P01 sits at another console.", "bad"),

@@ -149,7 +149,7 @@ def left_out_by_files(logs: Logs) -> tuple[LeftOut, ...]:
 
 
 _RULE = re.compile(r"\(rule: (.*)\)")
-_COMMAND = re.compile(r"`((?:recoil |--)[^`]*)`")
+_COMMAND = re.compile(r"`((?:recoil |--|include_)[^`]*)`")
 
 
 def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
