@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from device.words import RecoilError
-from experiments.config.findings import CODE_PREFIX, findings_text, keys_in, line_of
+from experiments.config.findings import CODE_PREFIX, validation_text, keys_in, line_of
 
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
@@ -125,7 +125,7 @@ def checked_table(model: type[SomeModel], table: dict[str, Any], source: Path | 
     try:
         return _validated(model, table)
     except ValidationError as error:
-        raise ConfigError(findings_text(error, model, table, source, text)) from error
+        raise ConfigError(validation_text(error, model, table, source, text)) from error
 
 
 def _validated(model: type[SomeModel], table: dict[str, Any]) -> SomeModel:

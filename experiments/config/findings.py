@@ -33,7 +33,7 @@ PATTERNS: Mapping[str, str] = {
 """What the patterns of texts ask for, in words."""
 
 
-def findings_text(
+def validation_text(
     error: ValidationError, model: type[BaseModel], table: dict[str, Any], source: Path | str, text: str
 ) -> str:
     """A line for every finding: file, line, key, value and rule; of many alike the first five."""
