@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.patterns import group_in, holding
+from analysis.logs.reading import read_logs
 from analysis.paper.audit.run import PaperFile, load_paper_file
+from analysis.summary.analyze import Request, analyze
 from analysis.summary.remarks_coding import Codebook
 from device.words import RecoilError, few_of_each
 from experiments.config.door import ConfigError, checked_table, tables
+from tests.log_files import write_study
 
 BOMB, CAMEL = "(a+)+$", "a" * 5_000 + "!"
 
@@ -99,6 +104,38 @@ def test_a_hundred_thousand_findings_are_soon_said() -> None:
     with pytest.raises(ConfigError) as refused:
         checked_table(PaperFile, {"claims": [1] * 100_000}, "paper.toml")
     assert str(refused.value).splitlines()[5:] == ["... and 1995 more like them", "... and 98000 more"]
+
+
+def test_a_log_of_a_million_rows_is_refused_with_the_bound(tmp_path: Path) -> None:
+    (tmp_path / "sub-P01_task-direction_trials.csv").write_bytes(b"participant_id,trial\n" + b"P01,1\n" * 1_000_000)
+    (tmp_path / "sub-P01_task-grip_trials.csv").write_bytes(b"participant_id,trial\n" + b"P01,1\n" * 1_000_000)
+    said = [problem.message for problem in read_logs([tmp_path]).problems]
+    assert len(said) == 2
+    assert all("more than 100,000 rows" in one for one in said)
+
+
+@pytest.mark.parametrize(("rows", "said"), [(1_000_000, "more than 400,000 rows"), (100_001, "100,001 rows")])
+def test_so_is_one_that_a_map_reads(tmp_path: Path, rows: int, said: str) -> None:
+    (tmp_path / "a.csv").write_bytes(b"who,m,r\n" + b"P01,a,5\n" * rows)
+    mapping = checked_table(
+        ColumnMap,
+        {"experiment": "preference", "participant": {"column": "who"}, "columns": {"method": "m", "rating": "r"}},
+        "map.toml",
+    )
+    assert said in read_logs([tmp_path / "a.csv"], mapping=mapping).problems[0].message
+
+
+def test_analysis_tells_of_each_part_that_is_done(tmp_path: Path) -> None:
+    told: list[str] = []
+
+    @contextmanager
+    def progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
+        told.append(f"{what} {total}")
+        yield told.append
+
+    write_study(tmp_path / "logs", 3)
+    analyze(Request(paths=[tmp_path / "logs"], out=tmp_path / "out"), progress=progress)
+    assert told == ["analyze 4", "statistics", "fits", "figures", "pages"]
 
 
 def test_like_problems_of_files_are_counted_by_what_is_wrong() -> None:

@@ -29,7 +29,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from analysis.logs.files import BadLogError
+from analysis.logs.files import LONGEST_LOG, BadLogError
 from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
 from analysis.logs.names import MethodNames
 from analysis.logs.texts import CsvRecord
@@ -268,6 +268,8 @@ def _check_header(header: list[str], mapping: ColumnMap) -> None:
 
 def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
+    if len(lines) > LONGEST_LOG:
+        raise BadLogError(f"participant {code} has {len(lines):,} rows (rule: at most {LONGEST_LOG:,})")
     column = mapping.participant.column
     check_person(code, mapping.participant, lines[0].number, [line.cells[column] for line in lines] if column else ())
     make = _rating if tables.is_rated(mapping.experiment) else _trial

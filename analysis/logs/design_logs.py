@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
-from analysis.logs.files import BadLogError, code_in_name, experiment_in_name, read_content
+from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name, read_content
 from analysis.logs.journals import compared_with, journal_of
 from analysis.logs.names import gun_labels
 from experiments.config.setup import sha256
@@ -61,6 +61,7 @@ def read_design_log(path: str, made: bytes | None = None) -> DesignLog:
     `BadLogError`: it breaks a rule, or nothing says what its columns mean.
     """
     content = read_content(path) if made is None else made
+    check_length(content)
     data, design, head = _design_of(path)
     rows = tuple(_rows(content, design))
     code = _code(path, rows)

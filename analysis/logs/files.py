@@ -189,6 +189,16 @@ def experiment_in_name(path: str) -> str:
     return found[1] if found else ""
 
 
+LONGEST_LOG, LONGEST_MAPPED = 100_000, 400_000
+"""Of a participant's log, ten times what a design may ask of a participant; and of a file that a map reads."""
+
+
+def check_length(content: bytes, most: int = LONGEST_LOG) -> None:
+    """`BadLogError` for a file of more lines than are analysed while somebody waits."""
+    if content.count(b"\n") > most + 1:
+        raise BadLogError(f"has more than {most:,} rows (rule: at most so many in a file)")
+
+
 def read_content(path: str) -> bytes:
     """A file's bytes; `BadLogError` if it cannot be read."""
     try:

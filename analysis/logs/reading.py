@@ -20,8 +20,10 @@ from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapp
 from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
 from analysis.logs.files import (
     ENDINGS,
+    LONGEST_MAPPED,
     BadLogError,
     Problem,
+    check_length,
     code_in_name,
     experiment_in_name,
     find_logs,
@@ -388,8 +390,10 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
             if isinstance(one.content, BadLogError):
                 raise one.content
             if mapping is not None and not is_recoils(one.content):
+                check_length(one.content, LONGEST_MAPPED)
                 tables.append(_mapped(batch, number, read_mapped(one.content, one.file.name, mapping), mapping))
             else:
+                check_length(one.content)
                 batch.journals[number] = compared(one.path, one.content)
                 contents[number], names[number] = one.content, code_in_name(one.path)
         except BadLogError as bad:

@@ -44,7 +44,9 @@ WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as ma
 _Name = TypeVar("_Name")
 _Found = TypeVar("_Found")
 
-Progress = Callable[[str, int], AbstractContextManager[Callable[[str], None]]]
+Tell = Callable[[str], None]
+"""Is told of each part that is done."""
+Progress = Callable[[str, int], AbstractContextManager[Tell]]
 """From what is done and of how many parts: a bar, told of each part."""
 
 
@@ -157,3 +159,13 @@ def progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=False) as shown:
         task = shown.add_task(what, total=total)
         yield lambda done: shown.update(task, advance=1, description=f"{what}: {done}")
+
+
+def untold(part: str) -> None:
+    """Nobody waits."""
+
+
+@contextmanager
+def unseen(what: str, total: int) -> Iterator[Callable[[str], None]]:  # noqa: ARG001 - as `progress`
+    """No bar at all."""
+    yield untold

@@ -15,6 +15,7 @@ from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.audit.page import predictions
 from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Prediction, load_paper
+from analysis.report.terminal import Progress, Tell, unseen, untold
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
 from analysis.summary.participation import exclusion_lines, participation
@@ -29,6 +30,9 @@ from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
+
+_PARTS = 4
+"""Statistics, fits, figures and pages: a bar tells of each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +63,9 @@ class _Analysed:
     tables: Mapping[str, bytes]
 
 
-def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tuple[str, ...]]:
+def analyze(
+    request: Request, track: Track = iter, progress: Progress = unseen
+) -> tuple[StudyStatistics, tuple[str, ...]]:
     """Write statistics, tables and report of all usable logs; returns the statistics and what there is to say.
 
     That is whose logs were left out, and what was used though something is to be said of it.
@@ -74,29 +80,31 @@ def analyze(request: Request, track: Track = iter) -> tuple[StudyStatistics, tup
     logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
     refuse_nothing(request.paths, logs)
     parts = (replace(logs, apart=()), *logs.apart)
-    main, *others = [_analysed(part, rules, request) for part in parts]
-    kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
-    statistics = replace(main.statistics, kept_apart=kept_apart or None)
-    coded = None if book is None else _coded(main.logs, statistics, book)
-    if coded is not None:
-        statistics = replace(statistics, remarks=coded)
-    if asked is not None and request.requests is not None:
-        statistics = replace(statistics, requested=answers_to(asked, request.requests, main.logs))
-    storage.make_folder(request.out)
-    report = ReportData(
-        title=report_title(request.paths),
-        statistics=statistics,
-        problems=logs.problems,
-        remarks=logs.remarks,
-        comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
-        files=logs.files,
-        beside=tuple(main.tables),
-        provenance=provenance() | _read_by(request.columns, mapping),
-        dropped=tuple(_notes(main.effect)),
-        extra=() if coded is None else (remarks_coding.coding_section(coded),),
-        apart=tuple(_report_apart(one) for one in others),
-    )
-    write_report(request.out, report)
+    with progress("analyze", _PARTS) as tell:
+        main = _analysed(parts[0], rules, request, tell)
+        others = [_analysed(part, rules, request) for part in parts[1:]]
+        kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
+        statistics = replace(main.statistics, kept_apart=kept_apart or None)
+        coded = None if book is None else _coded(main.logs, statistics, book)
+        if coded is not None:
+            statistics = replace(statistics, remarks=coded)
+        if asked is not None and request.requests is not None:
+            statistics = replace(statistics, requested=answers_to(asked, request.requests, main.logs))
+        storage.make_folder(request.out)
+        report = ReportData(
+            title=report_title(request.paths),
+            statistics=statistics,
+            problems=logs.problems,
+            remarks=logs.remarks,
+            comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
+            files=logs.files,
+            beside=tuple(main.tables),
+            provenance=provenance() | _read_by(request.columns, mapping),
+            dropped=tuple(_notes(main.effect)),
+            extra=() if coded is None else (remarks_coding.coding_section(coded),),
+            apart=tuple(_report_apart(one) for one in others),
+        )
+        write_report(request.out, report, tell)
     _write_tables(request.out, main)
     for one in others:
         storage.make_folder(request.out / folder_of(one.logs.kind))
@@ -136,11 +144,12 @@ def report_title(paths: Sequence[Path]) -> str:
     return f"Statistics of {', '.join(names[:_TITLED])}{more}"
 
 
-def _analysed(logs: Logs, rules: Rules | None, request: Request) -> _Analysed:
+def _analysed(logs: Logs, rules: Rules | None, request: Request, tell: Tell = untold) -> _Analysed:
     """The statistics of logs of one kind of data, after the rules if there are some."""
     effect = apply_rules(logs, rules) if rules is not None else None
     used = effect.logs if effect is not None else logs
-    statistics = replace(summarize(used, fits=request.fits), studies=_by_study(used, fits=request.fits))
+    found = summarize(used, fits=request.fits, tell=tell)
+    statistics = replace(found, studies=_by_study(used, fits=request.fits))
     if effect is not None and rules is not None and request.rules is not None:
         statistics = _with_rules(statistics, effect, rules, request.rules)
     return _Analysed(

@@ -18,6 +18,7 @@ from analysis.logs.exclusions import LeftOut, complete_rows
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.report.serial import undefined
+from analysis.report.terminal import Tell, untold
 from analysis.stats.anova import Comparison, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test, yes_no
@@ -68,15 +69,15 @@ UNDEFINED = "written as null"
 """What the warning about an undefined number says."""
 
 
-def summarize(logs: Logs, *, trade: bool = True, fits: bool = False) -> results.StudyStatistics:
-    """The statistics of `logs`: rates 0 to 1, SD with n - 1.
+def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell = untold) -> results.StudyStatistics:
+    """The statistics of `logs`: rates 0 to 1, SD with n - 1; `tell` of "statistics" and of "fits".
 
     `trade`: with the measures of speed and accuracy; `fits`: with diffusion fits among them. An experiment without a
     log is left out. Participants who miss an answer or a method are left out of that experiment and listed in
     `excluded`. Numbers that are NaN or infinite are named in `warnings`. What stands apart in the logs is kept apart.
     """
     names = logs.methods
-    direction, left_out = _direction(logs.trials, names, trade=trade, fits=fits) if len(logs.trials) else (None, [])
+    direction, left_out = _direction(logs.trials, names) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings, names) if len(logs.ratings) else (None, [])
     designs = {one.design.design: summarise(one.design, one.table, one.gun_labels) for one in logs.designs}
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
@@ -88,6 +89,11 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False) -> results.
         data_kind=logs.kind,
         labels=_labels((direction, preference), names),
     )
+    tell("statistics")
+    if direction is not None and trade:
+        direction = _timed(direction, logs.trials, names, fits=fits)
+        found = replace(found, direction=direction)
+    tell("fits")
     apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
     said = (*_hasty(logs.trials), *_repeated(logs.ratings), *_warnings(found))
     return replace(found, warnings=said, versions=statistics_versions(), kept_apart=apart or None)
@@ -189,9 +195,15 @@ def _complete(
     return complete, methods, left_out
 
 
-def _direction(
-    table: pd.DataFrame, names: MethodNames, *, trade: bool, fits: bool
-) -> tuple[results.DirectionStatistics, list[LeftOut]]:
+def _timed(
+    found: results.DirectionStatistics, table: pd.DataFrame, names: MethodNames, *, fits: bool
+) -> results.DirectionStatistics:
+    """With the measures of speed and accuracy."""
+    complete, methods, _ = _complete(table, "direction", names)
+    return replace(found, speed_accuracy=speed_accuracy(complete, methods, fits=fits))
+
+
+def _direction(table: pd.DataFrame, names: MethodNames) -> tuple[results.DirectionStatistics, list[LeftOut]]:
     complete, methods, left_out = _complete(table, "direction", names)
     cells = trial_cells(complete, methods)
     within = _within(cells.rates("forward"), "direction", origin_of(complete, "response_source"))
@@ -205,7 +217,7 @@ def _direction(
         sensitivity={method: _sensitivity(cells, method) for method in methods},
         response_time=_median_times(complete, methods),
         response_times=response_times(complete, methods),
-        speed_accuracy=speed_accuracy(complete, methods, fits=fits) if trade else None,
+        speed_accuracy=None,
     )
     return replace(found, assumptions=assumptions(found)), left_out
 

@@ -82,7 +82,7 @@ def analyze(
         fits=fits,
         include_synthetic=include_synthetic,
     )
-    statistics, said = feature.analyze(asked, tracked)
+    statistics, said = feature.analyze(asked, tracked, progress)
     for line in few_of_each(said):
         say(f"recoil: {line}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)

@@ -112,7 +112,7 @@ class DfClaim(Claim):
     kind: Literal["df"]
     df: Annotated[list[PrintedText], Field(min_length=1)]
     design: ComparisonDesign
-    counts: Annotated[list[publication.AtLeastOne], Field(min_length=1)]
+    counts: Annotated[list[publication.AtLeastOne], Field(min_length=1, max_length=26)]
 
 
 class PClaim(Claim):
@@ -141,24 +141,24 @@ class RepeatedFClaim(MeansClaim):
 
     kind: Literal["repeated-f"]
     n: publication.AtLeastOne
-    k: publication.AtLeastOne
-    transforms: list[str] = Field(default_factory=list)
-    other_grains: list[PrintedText] = Field(default_factory=list)
+    k: Annotated[int, Field(ge=1, le=26)]
+    transforms: Annotated[list[str], Field(max_length=5)] = Field(default_factory=list)
+    other_grains: Annotated[list[PrintedText], Field(max_length=5)] = Field(default_factory=list)
 
 
 class BetweenFClaim(MeansClaim):
     """F between groups, against their means; see `between_f`."""
 
     kind: Literal["between-f"]
-    sizes: Annotated[list[publication.AtLeastOne], Field(min_length=2)]
+    sizes: Annotated[list[publication.AtLeastOne], Field(min_length=2, max_length=26)]
 
 
 class TukeyClaim(MeansClaim):
     """The pattern of a Tukey test; see `tukey_pattern`."""
 
     kind: Literal["tukey"]
-    sizes: Annotated[list[publication.AtLeastOne], Field(min_length=2)]
-    comparisons: Annotated[list[ClaimedComparison], Field(min_length=1)]
+    sizes: Annotated[list[publication.AtLeastOne], Field(min_length=2, max_length=26)]
+    comparisons: Annotated[list[ClaimedComparison], Field(min_length=1, max_length=100)]
     repeated: bool = True
     grain: PrintedText | None = None  # type: ignore[assignment]
 

@@ -38,6 +38,8 @@ OWN_ERROR = "each pair's own error term"
 _SOURCE = "Tukey 1953; Kramer 1956, Biometrics 12, 307; Winer 1971, chapter 4"
 _POINTS, _GOLDEN = 12, Fraction(618, 1000)
 """Means tried within what prints alike, and the step that spreads them evenly."""
+_SPANS, _BOXES = {2: 13, 3: 13, 4: 7}, 200
+"""Small whole means that are tried by their number, and sets of means on the lattice."""
 Box = tuple[Interval, ...]
 """The values that each mean may have."""
 Point = tuple[Fraction, ...]
@@ -193,7 +195,7 @@ def _boxes(pattern: _Pattern, rounding: Rounding) -> list[Box] | None:
     if pattern.scale is None:
         return [intervals]
     scale = pattern.scale
-    choices = column_choices([scale.sums(i, n) for i, n in zip(intervals, pattern.sizes, strict=True)])
+    choices = column_choices([scale.sums(i, n) for i, n in zip(intervals, pattern.sizes, strict=True)], _BOXES)
     if choices is None:
         return [intervals]
     values = (tuple(scale.value(Fraction(c, n)) for c, n in zip(sums, pattern.sizes, strict=True)) for sums in choices)
@@ -203,7 +205,8 @@ def _boxes(pattern: _Pattern, rounding: Rounding) -> list[Box] | None:
 def _points(pattern: _Pattern, boxes: list[Box] | None) -> Iterator[Point]:
     """Means to try: those of the boxes, or small whole numbers in every order."""
     if boxes is None:
-        yield from (tuple(map(Fraction, means)) for means in product(range(13), repeat=pattern.k) if pattern.k <= 4)
+        span = _SPANS.get(pattern.k, 0)
+        yield from (tuple(map(Fraction, means)) for means in product(range(span), repeat=pattern.k))
         return
     for box in boxes:
         for place in range(1 if all(interval.low == interval.high for interval in box) else _POINTS):

@@ -44,7 +44,7 @@ from analysis.paper.audit.printed import (
     read_printed,
 )
 
-_STEPS, _STARTS, _MARGIN = 1_500, 8, 1e-9
+_STEPS, _STARTS, _MARGIN, _FEW_VALUES = 1_500, 8, 1e-9, 100
 
 TRANSFORMS: dict[str, Callable[[float], float]] = {
     "arcsine": lambda share: asin(sqrt(share)),
@@ -66,7 +66,7 @@ def find_transformed(name: str, columns: Sequence[int], n: int, top: int, F: Int
     values = [TRANSFORMS[name](y / top) for y in range(top + 1)]
     low, high = float(F.low) * (1 + _MARGIN), float(F.high) * (1 - _MARGIN)
     random = Random(1)  # noqa: S311 a search, no secret
-    for _ in range(_STARTS):
+    for _ in range(_STARTS if n * len(columns) <= _FEW_VALUES else 1):
         rows = _climbed(_spread(columns, n), values, (low, high), random)
         if rows is not None:
             return tuple(map(tuple, rows))
@@ -115,7 +115,10 @@ def _f_of(rows: list[list[int]], values: Sequence[float]) -> float:
 Search = Callable[[Sequence[int], Interval], Rows | bool | None]
 """From column sums and the F allowed: data in grains, False if proved that there are none, None if not settled."""
 _SOURCE = "Winer 1971, chapter 4; lattice of whole sums as in Brown & Heathers 2017 and Anaya 2016"
-_GUESSES = 3_000
+_GUESSES, _SEARCHES = 3_000, 20
+"""Column sums that are tried, and searches that may end without an answer."""
+_MOST_VALUES, _MOST_TRANSFORMED = 20_000, 1_000
+"""Values that a search moves within a second, and of those that are transformed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +211,8 @@ def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale:
     for size in sizes:
         check_count(size, "each group")
     check_count(max(sizes) - 1, "size of the largest group less 1")
+    if sum(sizes) > _MOST_VALUES:
+        raise ValueError(f"values must be at most {_MOST_VALUES:,} in all for an F, not {sum(sizes)}")
     if (scale.low is None) != (scale.high is None):
         raise ValueError("a scale needs both ends or none")
     if means is not None and len(means) != len(sizes):
@@ -232,6 +237,8 @@ def _transformed(claim: _Claim, name: str) -> Search:
     top = claim.top
     if top is None or claim.means is None:
         raise ValueError(f"the {name} transform needs a scale with both ends, and means")
+    if sum(claim.sizes) > _MOST_TRANSFORMED or top > _MOST_VALUES:
+        raise ValueError(f"the {name} transform is searched for in at most {_MOST_TRANSFORMED:,} values")
     return lambda columns, F: find_transformed(name, columns, claim.n, top, F)
 
 
@@ -240,10 +247,13 @@ def _data(claim: _Claim, search: Search, rounding: Rounding) -> DataExistence:
     if F.high is not None and F.high < 0:
         return NONE_EXISTS
     columns, complete = _columns(claim, rounding)
+    left = _SEARCHES
     for sums in columns:
         found = search(sums, F)
         if found is None:
-            complete = False
+            complete, left = False, left - 1
+            if left == 0:
+                break
         elif found is not False and found is not True:
             return DataExistence(True, tuple(tuple(map(claim.scale.value, row)) for row in found))
     return NONE_EXISTS if complete else UNKNOWN

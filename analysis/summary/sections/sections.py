@@ -12,6 +12,7 @@ from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.section import PageHead, PageNotice, Section, Table, names_in_full, shortened
 from analysis.report.serial import as_json
+from analysis.report.terminal import Tell, untold
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import sections_of_designs
 from analysis.summary.sections.experiments import direction_section, everybodys_values, preference_section
@@ -101,8 +102,10 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
 """The reader's order: who, what was found, how sure, what else; then what only some readers look up."""
 
 
-def write_report(out: Path, report: ReportData) -> None:
+def write_report(out: Path, report: ReportData, tell: Tell = untold) -> None:
     """Write `report.html`, `report.md`, `statistics.json` and `figures/` into `out`, which is made if need be.
+
+    `tell` of "figures" and of "pages".
 
     Files of an earlier report there are replaced. The same data give the same bytes.
     """
@@ -113,6 +116,8 @@ def write_report(out: Path, report: ReportData) -> None:
         write_figures(out / "figures", report)
         for one in report.apart:
             write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
+        tell("figures")
         parts = sections(report)
         write_page(out, report.title, (*parts, *names_in_full()), head)
     storage.write_whole(out / STATISTICS, as_json(report.statistics))
+    tell("pages")
