@@ -210,11 +210,13 @@ def values_changed(entries: list[Any], random: Random) -> None:
     """Values of some records in the place of others, keys lost."""
     for _ in range(random.choice((1, 1, 2))):
         entry = random.choice(entries)
-        *path, last = random.choice([place for place in _values(entry) if place] or [("kind",)])
+        if not entry:  # all of it was lost
+            continue
+        *path, last = random.choice([place for place in _values(entry) if place])
         for key in path:
             entry = entry[key]
         if random.random() < 0.2:
-            del entry[last]
+            entry.pop(last)
         else:
             entry[last] = random.choice(ODD_VALUES)
 
