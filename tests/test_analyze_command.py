@@ -48,6 +48,8 @@ def sites(tmp_path: Path) -> Path:
 def test_the_same_code_at_two_sites_is_two_people(recoil: Recoil, sites: Path, tmp_path: Path) -> None:
     done = recoil("analyze", sites, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
+    assert "read logs" in done.stderr
+    assert "analyze: pages" in done.stderr
     found = _statistics(tmp_path / "out")
     people = ["kyoto/P01", "kyoto/P02", "kyoto/P03", "oslo/P01", "oslo/P02"]
     assert list(found["direction"]["participants"]) == people

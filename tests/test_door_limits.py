@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -12,11 +10,9 @@ from analysis.logs.column_map import ColumnMap
 from analysis.logs.patterns import group_in, holding
 from analysis.logs.reading import read_logs
 from analysis.paper.audit.run import PaperFile, load_paper_file
-from analysis.summary.analyze import Request, analyze
 from analysis.summary.remarks_coding import Codebook
 from device.words import RecoilError, few_of_each
 from experiments.config.door import ConfigError, checked_table, tables
-from tests.log_files import write_study
 
 BOMB, CAMEL = "(a+)+$", "a" * 5_000 + "!"
 
@@ -123,19 +119,6 @@ def test_so_is_one_that_a_map_reads(tmp_path: Path, rows: int, said: str) -> Non
         "map.toml",
     )
     assert said in read_logs([tmp_path / "a.csv"], mapping=mapping).problems[0].message
-
-
-def test_analysis_tells_of_each_part_that_is_done(tmp_path: Path) -> None:
-    told: list[str] = []
-
-    @contextmanager
-    def progress(what: str, total: int) -> Iterator[Callable[[str], None]]:
-        told.append(f"{what} {total}")
-        yield told.append
-
-    write_study(tmp_path / "logs", 3)
-    analyze(Request(paths=[tmp_path / "logs"], out=tmp_path / "out"), progress=progress)
-    assert told == ["analyze 4", "statistics", "fits", "figures", "pages"]
 
 
 def test_like_problems_of_files_are_counted_by_what_is_wrong() -> None:

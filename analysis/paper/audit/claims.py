@@ -15,7 +15,7 @@ from pydantic import Field
 from analysis.paper import paper as publication
 from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.freedom import Bound, ComparisonDesign, Term, degrees_of_freedom, total
-from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count, scale_of
+from analysis.paper.audit.means import check_count, debit, grim, grimmer, percent_of_count, scale_of
 from analysis.paper.audit.p_values import Sides, Statistic, p_against_statistic
 from analysis.paper.audit.printed import CheckResult, JudgedReadings, PrintedText, Rounding, read_printed
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
@@ -273,6 +273,7 @@ def direction_claims(paper: publication.PublishedDirection) -> Iterator[Claim]:
     yield from _anova(paper, place, means)
     yield from _tukey(paper, place, means)
     n = paper.n * protocol.forward_trials_per_session
+    check_count(n, "n times forward_trials_per_session")
     for claim in paper.binomial:
         forward = claim.direction == "forward" and claim.method in paper.means
         counts = _counts(paper.means[claim.method], n) if forward else None
