@@ -130,8 +130,11 @@ FINISHED = "a run is finished"
 
 
 def left_out_by_files(logs: Logs) -> tuple[LeftOut, ...]:
-    """Whose logs could not be read, and whose runs are not finished. No path says on which machine."""
-    problems = logs.problems
+    """Whose logs could not be read, and whose runs are not finished. No path says on which machine.
+
+    What is no log, as a register or a folder without one, leaves nobody out by itself.
+    """
+    problems = [one for one in logs.problems if one.study]
     names = names_below([*logs.files, *(one.file for one in problems), *(Path(run.file.path) for run in logs.begun)])
     bad = (_by_problem(logs, one, names[one.file]) for one in problems)
     begun = (

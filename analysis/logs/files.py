@@ -159,7 +159,7 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
                         if entry.is_file():
                             logs.append((entry.path, target))
                         else:
-                            problems.append(Problem(file=Path(entry.path), line=None, column=None, message=_NO_FILE))
+                            problems.append(_no_file(entry.path))
         except OSError as error:
             reason = f"cannot be read: {error.strerror or error}"
             problems.append(Problem(file=Path(place), line=None, column=None, message=reason))
@@ -167,6 +167,11 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
     for path, real in sorted(logs, key=lambda log: log[0].split(os.sep)):  # noqa: PTH206 - of many thousands
         found.setdefault(real, path)
     return found
+
+
+def _no_file(path: str) -> Problem:
+    study = _study(path, path.rpartition(os.sep)[0])
+    return BadLogError(_NO_FILE).of(Path(path), code_in_name(path) or "", experiment_in_name(path), study)
 
 
 def code_in_name(path: str) -> str | None:
