@@ -80,7 +80,7 @@ CASES: dict[str, Any] = {
         edited(
             folder / "gun.toml",
             ('label = "Vibration"', f"label = {json.dumps(ODD)}"),
-            ('title = "Ungrounded', f"title = {json.dumps(MANY_LINES)} # "),
+            ('title = "Ungrounded', f"title = {json.dumps(ODD)} # "),
         ),
         edited(folder / "direction.toml", ('"Direction recognition of a shot"', json.dumps(ODD))),
     )[1],
