@@ -15,7 +15,7 @@ from analysis.summary.sections.manuscript import manuscript_section
 from analysis.summary.sections.participants import left_out_lines, notices
 from analysis.summary.sections.sections import sections
 from analysis.summary.summary import summarize
-from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
+from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.made_scores import RIGHT, study_of
 
 
@@ -56,11 +56,13 @@ def test_people_rebuilt_from_published_numbers_are_said_to_replicate_nothing(tmp
     assert "it replicates nothing" in notice.text
 
 
-def test_real_and_synthetic_answers_together_are_evidence_of_nothing(tmp_path: Path) -> None:
-    answered(tmp_path, 2, "participant", "VCG:007")
-    write_rows(ratings_path(tmp_path, "P09"), rating_rows("P09"))
+def test_real_and_synthetic_answers_in_one_log_are_evidence_of_nothing(tmp_path: Path) -> None:
+    """As of a simulated participant at the console whose answers somebody corrects."""
+    rows = [row | {"gun": "simulated"} for row in trial_rows("P01")]
+    rows[0] |= {"response_source": "experimenter", "response_time_valid": "0"}
+    write_rows(trials_path(tmp_path, "P01"), rows)
     (notice, _) = notices(report_of(tmp_path))
-    assert notice.text.startswith("SYNTHETIC AND REAL DATA TOGETHER: 3 of 123 answers")
+    assert notice.text.startswith("SYNTHETIC AND REAL DATA TOGETHER: 59 of 60 answers")
 
 
 @pytest.mark.slow
