@@ -56,7 +56,7 @@ def of_designs(*names: str) -> Logs:
     designs = []
     for name in names:
         config, laws = loaded(name)
-        designs.append(DesignLogs(design=config, table=simulated(config, laws, 8)))
+        designs.append(DesignLogs(design=config, table=simulated(config, laws, 8), gun_labels={}))
     return Logs(trials=empty, ratings=empty, files=(), problems=(), designs=tuple(designs))
 
 

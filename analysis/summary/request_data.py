@@ -1,9 +1,10 @@
-"""The scores and trials that requests are answer_to from, as the statistics of the report take them."""
+"""The scores and trials that requests are answered from, as the statistics of the report take them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -18,6 +19,20 @@ from experiments.config.door import ConfigError, read_text
 from experiments.config.findings import line_of
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig, shown_level
+
+
+class _Measure(NamedTuple):
+    """What the report's ANOVA tests of an experiment: a column, of all rows or of one direction's, and its unit."""
+
+    column: str
+    unit: str
+    directions: tuple[str, ...] = ()
+
+
+_MEASURES = {
+    "direction": _Measure("correct", "right answers to forward shots", ("forward",)),
+    "preference": _Measure("rating", "ratings"),
+}
 
 
 def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]:
@@ -36,24 +51,25 @@ def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]
 
 def request_data(logs: Logs, request: AnyRequest) -> RequestData:
     """What a request is about. `ValueError`: no such logs, or no such question."""
-    tables = {"direction": (logs.trials, "correct"), "preference": (logs.ratings, "rating")}
-    there = {name: table for name, table in tables.items() if len(table[0])}
+    tables = {"direction": logs.trials, "preference": logs.ratings}
+    there = {name: table for name, table in tables.items() if len(table)}
     designs = {one.design.design: one for one in logs.designs}
     if request.of in there:
         if request.question is not None:
             raise ValueError(f"question: {request.of} has one measure; leave the key out")
-        return _of_experiment(request.of, *there[request.of], logs.methods)
+        return _of_experiment(request.of, there[request.of], logs.methods)
     if request.of in designs:
         return _of_design(designs[request.of].design, request.question, designs[request.of].table)
     raise ValueError(f"of = {request.of!r}: there are no logs of it; there are some of {', '.join((*there, *designs))}")
 
 
-def _of_experiment(name: str, table: pd.DataFrame, measure: str, names: MethodNames) -> RequestData:
-    """Everybody who is complete; in direction the forward shots, as the report's ANOVA has them."""
+def _of_experiment(name: str, table: pd.DataFrame, names: MethodNames) -> RequestData:
+    """Everybody who is complete."""
+    measure, unit, directions = _MEASURES[name]
     methods = methods_in(table, names)
     rows = complete_rows(coded(table), name, methods)[0]
-    if name == "direction":
-        rows = rows[rows["direction"] == "forward"]
+    if directions:
+        rows = rows[rows["direction"].isin(directions)]
     trials = pd.DataFrame(
         {
             "participant_id": rows["participant_id"].astype(str),
@@ -62,7 +78,6 @@ def _of_experiment(name: str, table: pd.DataFrame, measure: str, names: MethodNa
         }
     )
     scores = trials.pivot_table(index="participant_id", columns="method", values="score").reindex(columns=methods)
-    unit = "right answers to forward shots" if name == "direction" else "ratings"
     return RequestData(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=unit)
 
 
