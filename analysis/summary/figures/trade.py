@@ -288,9 +288,6 @@ def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> Non
     axes.set_ylim(bottom=0.0)
     counted = "" if len(methods) > MANY_METHODS else "n = "
     name_ticks(axes, methods, [counted + _counts(times, m) for m in methods])
-    counts = "above the names: forward and backward trials; " if len(methods) > MANY_METHODS else ""
-    note = f"{counts}boxes: 5, 25, 50, 75 and 95 % of the trials{_medians_note(times)}"
-    axes.set_xlabel(note, fontsize=8.0, labelpad=8.0)
     axes.set_ylabel("response time [s]")
     axes.set_title("(b) By direction", loc="left", fontweight="bold")
     handles = [
@@ -331,7 +328,3 @@ def _draw_medians(axes: Axes, place: float, times: ResponseTimes, method: str, d
 def _counts(times: ResponseTimes, method: str) -> str:
     spreads = times.directions.get(method, {})
     return " / ".join(f"{spreads[d].n if d in spreads else 0:,}" for d in _PLACES)
-
-
-def _medians_note(times: ResponseTimes) -> str:
-    return "" if len(times.participants) > MANY else "; points: participants' medians"
