@@ -7,7 +7,7 @@ participants of the same config, whose logs are not written.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -32,6 +32,7 @@ from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, rates
 from analysis.predict.simulate.shot import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds, rates_of
 from analysis.report.serial import as_csv
+from analysis.report.terminal import Tell
 from analysis.summary.comparison import compare
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
@@ -57,9 +58,6 @@ MANIFEST = "reproduction.json"
 
 Observer = Literal["reconstructed", "rates"]
 """Who answers: participants rebuilt from the published numbers, or those that the configs describe."""
-
-Tell = Callable[[str], None]
-"""Told what was done, once a run and once a part of the analysis."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
