@@ -216,12 +216,12 @@ def _bytes(path: str) -> bytes:
     """A file's bytes with as few calls as can be: a log is mostly one piece."""
     descriptor = os.open(path, _READ_ONLY)
     try:
-        content = os.read(descriptor, _PIECE_BYTES)
+        pieces = [os.read(descriptor, _PIECE_BYTES)]
         while piece := os.read(descriptor, _PIECE_BYTES):
-            content += piece
+            pieces.append(piece)
     finally:
         os.close(descriptor)
-    return content
+    return pieces[0] if len(pieces) == 1 else b"".join(pieces)
 
 
 def study_names(folders: Iterable[str]) -> dict[str, str]:
