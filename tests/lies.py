@@ -657,7 +657,7 @@ _RULES: tuple[_Told, ...] = (
         ruled("[trials]\nresponse_time_min_s = 2.0\nresponse_time_max_s = 1.0\n"),
         "must be below response_time_max_s = 1",
     ),
-    ("a share of 80", ruled("[participants]\nmin_kept_share = 80\n"), "less than or equal to 1"),
+    ("a share of 80", ruled("[participants]\nmin_kept_share = 80\n"), "min_kept_share = 80: must be at most 1"),
     ("no reason", ruled('[[excluded]]\ncode = "P01"\n'), "reason: is missing; it is required"),
     (
         "rules that leave nobody",

@@ -142,13 +142,13 @@ class _Reading:
         files = {one.number: one for one in waiting}
         for number, log in sorted(batch.logs.items()):
             one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
-            code = mapped.participant if mapped else code_in_name(one.path) or ""
             study = (mapped and mapped.study) or one.study
             try:
                 if isinstance(log, BadLogError):
                     raise log
                 self.admit(number, one, log, study)
             except BadLogError as bad:
+                code = mapped.participant if mapped else code_in_name(one.path) or ""
                 experiment = mapped.experiment if mapped else experiment_in_name(one.path)
                 self.problems.append(bad.of(one.file, code, experiment, study))
             else:

@@ -101,9 +101,10 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
 
 def _hasty(table: pd.DataFrame) -> Iterator[str]:
     """Answers by the participant's own hand that came sooner than anybody reacts."""
-    if not len(table):
+    soon = table["response_time_s"].to_numpy(dtype=np.float64) < ANTICIPATION_S
+    if not soon.any():
         return
-    hasty = timed(table).by_own_hand & (table["response_time_s"].to_numpy(dtype=np.float64) < ANTICIPATION_S)
+    hasty = timed(table).by_own_hand & soon
     people = table["participant_id"][hasty].astype(str).value_counts(sort=False)
     if hasty.any():
         shown = ", ".join(f"{who} {count}" for who, count in sorted(people.items())[:_NAMED])

@@ -260,13 +260,13 @@ class _Look:
             return RunProgress(experiment=where.experiment, state="not begun")
         elsewhere = _is_held(where)
         data = self._data(where.journal)
-        found = progress_of(where, journal.contents_of(where.journal, data), elsewhere=elsewhere)
-        if found.state == "done" and not elsewhere and not where.table.exists():
+        contents = journal.contents_of(where.journal, data)
+        if contents is not None and contents.finished and not elsewhere and not where.table.exists():
             self.problems.append(
                 f"{where.table}: is missing, though the run is finished; `recoil rebuild {where.journal}` makes it "
                 "again; until then analyses make it from the journal"
             )
-        return found
+        return progress_of(where, contents, elsewhere=elsewhere)
 
     def _data(self, path: Path) -> bytes:
         """The bytes of a journal, whose head is kept."""
