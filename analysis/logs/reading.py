@@ -271,7 +271,8 @@ def _of_kind(
     names = study_names(folder for folder in set(mine.values()) if Path(folder).is_absolute())
     studies = {number: names.get(study, study) for number, study in mine.items()}
     by_design = _by_design(reading, {number: log for number, log in designs.items() if number in mine}, studies)
-    files = {number: file for number, file in reading.files.items() if number in {one // _LOGS_A_FILE for one in mine}}
+    used = {number // _LOGS_A_FILE for number in mine}
+    files = {number: file for number, file in reading.files.items() if number in used}
     trials, ratings = (joined(experiment, reading.blocks, studies) for experiment in ("direction", "preference"))
     methods = {str(method) for table in (trials, ratings) for method in table["method"].unique()}
     return Logs(
