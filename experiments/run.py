@@ -19,7 +19,6 @@ from experiments.design.plan import Plan
 from experiments.design.planning import plan_of, practice_of
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import checked_seed, draw_seed
-from experiments.desk import Desk
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.rebuild import began_with, table
@@ -36,7 +35,7 @@ from experiments.record.journal import (
 )
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
-from experiments.runner import carry_out, gun_name
+from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
 from experiments.session.steps import Answered, Describe, Session
 from experiments.study import balance, folders, register

@@ -14,7 +14,6 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
 from experiments.design.stimuli import stimuli_of
-from experiments.desk import Desk
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.rebuild import table
@@ -22,7 +21,7 @@ from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
-from experiments.runner import carry_out
+from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
 from experiments.session.design_session import design_session
 from experiments.session.remarks import Remark

@@ -12,8 +12,8 @@ import pytest
 
 from device import LimitError, LinkError, Pulse, Shot, ShotReport, ShotTiming
 from device.words import GunStatus
-from experiments.desk import LEAD_S
 from experiments.record.journal import read_journal
+from experiments.runner import LEAD_S
 from tests.serial_runs import of_trains
 from tests.sittings import Sitting, TroubledGun, resumed_rows, sitting
 
