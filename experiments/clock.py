@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Protocol
 
@@ -24,6 +25,9 @@ class Clock(Protocol):
 
     def wait(self, news: threading.Condition, seconds: float | None) -> None:
         """Wait for news, at most for so long; the condition's lock is held before and after."""
+
+    def go_on_after(self, utc: str) -> None:
+        """A run that stopped at this date and time goes on."""
 
 
 class RealClock:
@@ -49,6 +53,9 @@ class RealClock:
     def wait(self, news: threading.Condition, seconds: float | None) -> None:
         """Wait for news for real."""
         news.wait(None if seconds is None else max(0.0, seconds / self._speed))
+
+    def go_on_after(self, utc: str) -> None:
+        """The machine's date and time are what they are, earlier ones too."""
 
 
 class VirtualClock:
@@ -78,6 +85,12 @@ class VirtualClock:
             news.wait()
         else:
             self.sleep(seconds)
+
+    def go_on_after(self, utc: str) -> None:
+        """No earlier than that: the virtual time of the run that stopped may be ahead of the machine's."""
+        with suppress(ValueError, OverflowError):  # what is no date says nothing
+            stopped = datetime.fromisoformat(utc).astimezone(UTC)
+            self._start = max(self._start, stopped - timedelta(seconds=self._elapsed_s))
 
 
 def _iso(moment: datetime) -> str:

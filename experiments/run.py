@@ -267,6 +267,7 @@ def _plan_of(before: Contents, request: RunRequest) -> Plan:
 
 def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:
     if before is not None:
+        clock.go_on_after(before.records[-1].utc)
         return Journal.reopen(before, clock)
     try:
         storage.make_folder(place.folder)

@@ -91,6 +91,9 @@ class OwnClock:
     def utc(self) -> str:
         return datetime.fromtimestamp(1_790_000_000 + self._now_s, UTC).isoformat(timespec="microseconds")
 
+    def go_on_after(self, utc: str) -> None:
+        pass
+
     def skip(self, seconds: float) -> None:
         """Let time go by."""
         with self._lock:

@@ -60,3 +60,12 @@ def test_the_real_clock_is_the_machines() -> None:
 
 def test_a_journal_can_tell_the_clocks_apart() -> None:
     assert (RealClock().name, VirtualClock().name) == ("real", "virtual")
+
+
+def test_a_virtual_clock_goes_on_after_the_run_that_stopped_ahead_of_it() -> None:
+    clock = VirtualClock()
+    clock.go_on_after("2999-01-02T03:04:05.000006Z")
+    assert clock.utc() == "2999-01-02T03:04:05.000006Z"
+    for earlier in ("2001-01-01T00:00:00.000000Z", "yesterday", ""):
+        clock.go_on_after(earlier)
+    assert clock.utc() == "2999-01-02T03:04:05.000006Z"

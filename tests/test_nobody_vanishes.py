@@ -29,6 +29,9 @@ class LaterClock(VirtualClock):
         super().__init__()
         self._start = datetime(2026, 3, 11, 9, tzinfo=UTC) - back
 
+    def go_on_after(self, utc: str) -> None:
+        pass
+
 
 def ran(folder: Path, code: str = "P01", config: str = "preference", **how: object) -> None:
     asked = RunRequest(setup=load_setup(config), participant_id=code, results=folder, seed=1, **how)  # type: ignore[arg-type]
