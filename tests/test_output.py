@@ -292,12 +292,10 @@ def test_letters_that_no_font_has_are_said_once_and_the_code_is_drawn(
     monkeypatch.setattr(glyphs, "_installed", list)
     monkeypatch.setattr(glyphs, "_chosen", [])
     monkeypatch.setattr(glyphs, "_said", set())
-    glyphs._fonts_for.cache_clear()
     assert ten.direction is not None
     with labelled({"v1": "𓀀 鳥", "v2": "plain"}):
         figure_directions(ten.direction, tmp_path / "never")
         figure_8(ten, tmp_path / "never")
-    glyphs._fonts_for.cache_clear()
     written = {text.get_text() for figure in drawn for text in figure.findobj(Text)}
     assert {"v1", "plain"} <= written
     assert not any("鳥" in text for text in written)

