@@ -203,6 +203,7 @@ def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, m
 
 def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_is(link, hands):
     question = replace(WHICH, onset_s=time.monotonic())
+    time.sleep(FAR_S)  # farther than the two clocks may be apart: else the key may seem to be before the onset
     hands.key("b")
     before = link.ask_choice(question)
     time.sleep(2 * FAR_S)
@@ -215,6 +216,7 @@ def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_
 def test_after_a_pause_a_key_counts_once_the_question_stands_there_again(link, hands, console):
     show(link, "Paused")
     question = replace(WHICH, onset_s=time.monotonic(), once_seen=True)
+    time.sleep(FAR_S)
     hands.key("b")
     answer = hands.changing(lambda: console.submit(link.ask_choice, question))
     hands.key("f")
