@@ -356,7 +356,7 @@ def test_check_and_run_refuse_a_method_that_never_moves_with_the_same_words(fold
     command, *options = words
     done = recoil(command, folder / DIRECTION, *options)
     assert done.returncode == 2
-    assert f"{folder / GUN}: methods.asymmetric-2: no shot ever moves the magnet" in " ".join(done.stderr.split())
+    assert f"{folder / GUN}:43: methods.asymmetric-2: no shot ever moves the magnet" in " ".join(done.stderr.split())
     assert "Traceback" not in done.stderr
     assert not (folder / "results").exists()
 

@@ -257,7 +257,7 @@ def test_answers_from_a_table_have_no_power(tmp_path: Path) -> None:
     table = '[questions.response]\nlaw = "table"\nfile = "answers.csv"\nby = ["method", "direction"]\n'
     (tmp_path / "synthetic" / "direction.toml").write_text(table)
     (tmp_path / "answers.csv").write_text("participant_id,method,direction,correct\n")
-    with pytest.raises(ConfigError, match=r'direction\.toml: questions\.response: the law "table" has no power'):
+    with pytest.raises(ConfigError, match=r'direction\.toml:2: questions\.response\.law: "table" has no power'):
         make_grid(PowerRequest(config=config))
 
 

@@ -88,7 +88,7 @@ def test_codes_given_by_hand_come_from_a_table(tmp_path: Path) -> None:
     [
         ('pattern = "stab(le|ility)"', 'pattern = "stab("', "no regular expression"),
         ('code = "stuck"', 'code = "toy"', "more than once"),
-        ('code = "stuck"', 'code = "two words"', "pattern"),
+        ('code = "stuck"', 'code = "two words"', "letters, digits, _ or -"),
         ('words = ["toy", "children"]', 'words = "toy"', "words"),
         ('label = "The bullet is stuck."\n', "", "missing"),
         ("[[codes]]", 'hand_coded = "none.csv"\n[[codes]]', "none.csv"),

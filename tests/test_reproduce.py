@@ -51,7 +51,9 @@ def test_every_table_rebuilt_from_its_journal_is_the_same_byte_for_byte(reproduc
 def test_the_tables_alone_give_the_same_numbers(reproduction: Path, tmp_path: Path) -> None:
     for table in reproduction.glob("logs/sub-*/*.csv"):
         (tmp_path / table.name).write_bytes(table.read_bytes())
-    assert summarize(read_logs([tmp_path]), fits=True).to_dict() == statistics(reproduction)
+    found = statistics(reproduction)
+    assert found.pop("labels")["vibration"] == "Vibration"  # which the journals know, the tables do not
+    assert summarize(read_logs([tmp_path]), fits=True).to_dict() == found
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)

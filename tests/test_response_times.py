@@ -53,7 +53,7 @@ def test_one_rule_says_which_times_are_valid_for_the_counts_and_for_the_fits(tmp
         {"response_source": ""},
         {"response_time_s": ""},
         {"response_time_s": "0"},
-        {"response_time_s": "-0.2"},
+        {"response_time_s": "0.0"},
     ]
     rows = trial_rows("P01")
     rows[:6] = [row | cells for row, cells in zip(rows, spoilt, strict=False)]

@@ -83,18 +83,22 @@ def do(study: StudyFolder, code: str, experiment: str = "direction", records: in
     """A run by a synthetic participant, to its end or broken off after some records; its journal."""
     where = place(study.results, code, experiment)
     where.folder.mkdir(parents=True, exist_ok=True)
-    where.journal.write_bytes(b"".join(whole_run(code, experiment)[:records]))
+    lines, table = whole_run(code, experiment)
+    where.journal.write_bytes(b"".join(lines[:records]))
+    if records is None:
+        where.table.write_bytes(table)
     return where.journal
 
 
 @lru_cache
-def whole_run(code: str, experiment: str) -> list[bytes]:
-    """The lines of the journal of a run with the shipped configs."""
+def whole_run(code: str, experiment: str) -> tuple[list[bytes], bytes]:
+    """The lines of the journal of a run with the shipped configs, and its table."""
     with tempfile.TemporaryDirectory() as results:
         request = RunRequest(
             setup=load_setup(experiment), participant_id=code, results=Path(results), screen="terminal"
         )
-        return run(request, synthetic_screen, VirtualClock()).place.journal.read_bytes().splitlines(keepends=True)
+        done = run(request, synthetic_screen, VirtualClock()).place
+        return done.journal.read_bytes().splitlines(keepends=True), done.table.read_bytes()
 
 
 def join(study: StudyFolder, code: str, facts: Facts = FACTS) -> None:
