@@ -110,7 +110,7 @@ def test_it_says_what_is_assumed_and_what_cannot_be_told(found: Any, folder: Pat
     assert found["untold"]["boundary"] == pytest.approx(1.0)
     page = (folder / "report.md").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     for words in (
-        "no response times from the participant's own hand, so drift and boundary cannot be told apart",
+        "no response times from the participant's own hand, drift and boundary cannot be told apart",
         "A prediction, not a measurement",
         "no evidence for the model",
     ):

@@ -16,13 +16,13 @@ Correction = Literal["none", "holm", "benjamini-hochberg"]
 def holm(p: ArrayLike) -> FloatArray:
     """P-values adjusted for their number m: the running maximum of (m - i) p_(i), i = 0.. in rising order, at most 1.
 
-    Rejecting where the result is below .05 keeps the chance of any false rejection below .05.
-    Source: Holm 1979, Scand. J. Stat. 6, 65.
+    Rejecting where the result is below .05 keeps the chance of any false rejection below .05. `ValueError`: a p outside
+    0..1. Source: Holm 1979, Scand. J. Stat. 6, 65.
 
     >>> holm([0.01, 0.04, 0.03]).tolist()
     [0.03, 0.06, 0.06]
     """
-    array = numbers(p, "p").ravel()
+    array = _p_values(p)
     order = np.argsort(array, kind="stable")
     steps = np.maximum.accumulate((array.size - np.arange(array.size)) * array[order])
     adjusted = np.empty_like(array)
@@ -40,7 +40,7 @@ def benjamini_hochberg(p: ArrayLike) -> FloatArray:
     >>> benjamini_hochberg([0.01, 0.04, 0.03]).round(12).tolist()
     [0.03, 0.04, 0.04]
     """
-    array = numbers(p, "p").ravel()
+    array = _p_values(p)
     return np.asarray(stats.false_discovery_control(array, method="bh")) if array.size else array
 
 
@@ -51,5 +51,13 @@ def corrected(p: ArrayLike, correction: Correction) -> FloatArray:
     ([0.02, 0.04], [0.01, 0.04])
     """
     if correction == "none":
-        return numbers(p, "p").ravel()
+        return _p_values(p)
     return holm(p) if correction == "holm" else benjamini_hochberg(p)
+
+
+def _p_values(p: ArrayLike) -> FloatArray:
+    array = numbers(p, "p").ravel()
+    strange = (array < 0.0) | (array > 1.0)
+    if strange.any():
+        raise ValueError(f"p must lie between 0 and 1, but one is {array[strange][0]}")
+    return array

@@ -86,8 +86,8 @@ def _icc(y: FloatArray, m: FloatArray) -> float:
 MODEL_NAME = "logistic GEE, independence working correlation, bias-reduced sandwich (Mancl & DeRouen 2001)"
 MODEL_NOTE = (
     "The model is a population-averaged logistic regression of the single forward answers on the method, with the "
-    "participants as clusters (generalised estimating equations). It is not a mixed-effects logistic regression, "
-    "because no frequentist one is at hand in Python (statsmodels has a variational Bayesian one only). With few "
+    "participants as clusters (generalised estimating equations). It tells of the population's odds, not of "
+    "one person's; the mixed model, which does, stands in the report on request (`--requests`). With few "
     "participants the plain sandwich is too small: Mancl & DeRouen's correction is used, t on n − 1 and Hotelling's F "
     "on (k − 1, n − k + 1) degrees of freedom. With one factor the estimates are the logits of the pooled rates, so no "
     "iteration can fail to converge."

@@ -94,8 +94,8 @@ def _judged(
 
 
 NO_OWN_TIMES = (
-    "The paper's protocol gives no response times from the participant's own hand, so drift and boundary cannot be "
-    "told apart from it: rates fix only their product."
+    "With no response times from the participant's own hand, drift and boundary cannot be told apart: rates fix only "
+    "their product."
 )
 OUTSIDE = 0.05
 """A number farther out than this share of the studies is at odds with the model."""
