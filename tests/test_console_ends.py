@@ -73,7 +73,7 @@ def lose_the_results(screen: AtConsole, lose: Callable[[], object]) -> str:
     screen.to("preparing", trial=2)
     lose()
     screen.keys.press("space")
-    look = screen.until(lambda look: look.ended)
+    look = screen.until(lambda look: look.ended and look.says("the journal was"))
     assert not look.says("all that were given")
     return next(text for text in look.texts if "the journal was" in text)
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
-from PyQt6.QtCore import QEventLoop, QObject, pyqtSignal
+from PyQt6.QtCore import QEventLoop, QObject, Qt, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
 from device import DeviceError, Gun, GunStatus
@@ -108,7 +108,7 @@ class Console:
         self._thread = threading.Thread(target=self._run, name="run")
         self._loop, self._bridge = QEventLoop(), _Bridge()
         self._bridge.opening.connect(self._open)
-        self._bridge.message.connect(self._take)
+        self._bridge.message.connect(self._take, Qt.ConnectionType.QueuedConnection)  # type: ignore[call-arg] # as Qt has it
         self._tell = self._bridge.message.emit
 
     def run(self) -> Finished:

@@ -6,7 +6,7 @@ It decides nothing: keys and buttons become events, and the table of states judg
 from __future__ import annotations
 
 from PyQt6 import QtWidgets
-from PyQt6.QtCore import QTimer, pyqtSignal
+from PyQt6.QtCore import QCoreApplication, QEvent, QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 
 from experiments.clock import Clock
@@ -26,12 +26,26 @@ from experiments.session.states import Position
 from experiments.session.steps import Failed, Rested
 
 REFRESH_MS = 100
+SOON_MS = 3
+"""How soon news is drawn: an answer's record is on the disk by then, and what it leads to is drawn with it."""
 BRIEF_S = 4.0
 """How long it is shown why something was refused."""
 WIDE_PX, HIGH_PX = 1280.0, 760.0
 """The size at which type has its own size."""
 SMALLEST, LARGEST = 0.55, 2.2
 """How far type shrinks and grows with the window."""
+_AFTER_PAINT = -2
+"""A priority below that of the paints which Qt posts (`Qt.EventPriority.LowEventPriority`, -1)."""
+
+
+class _Painted(QEvent):
+    """Comes when the position of a serial number has been painted."""
+
+    Kind = QEvent.Type(QEvent.registerEventType())
+
+    def __init__(self, serial: int) -> None:
+        super().__init__(self.Kind)
+        self.serial = serial
 
 
 class ConsoleWindow(QtWidgets.QMainWindow):
@@ -44,7 +58,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self.about, self.clock = about, clock
         self.live: LiveRun | None = None
         self.controls: Controls | None = None
-        self.drawn = Position()
+        self.drawn, self._painted = Position(), -1
         self.gun: view.GunSeen | None = None
         self.participant: view.ParticipantSeen | None = None
         self.ended: view.Ended | None = None
@@ -59,6 +73,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.refresh)
         self._timer.start(REFRESH_MS)
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(SOON_MS)
+        self._soon.timeout.connect(self.refresh)
 
     # building
 
@@ -91,10 +109,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def begin(self, live: LiveRun, controls: Controls) -> None:
         """A live run is there, and who works it."""
-        self.live, self.controls = live, controls
+        self.live, self.controls, self._painted = live, controls, -1
 
     def take(self, message: view.Message) -> None:
-        """Take a message from the run, show it, and say when it was painted."""
+        """Take a message from the run, which is shown soon."""
         match message:
             case view.Began() | view.Shown():
                 self._arrive()
@@ -108,10 +126,16 @@ class ConsoleWindow(QtWidgets.QMainWindow):
                 self._last(message.text, message.mood)
             case view.Ended():
                 self._end(message)
-        self.refresh()
-        if isinstance(message, view.Shown | view.Began) and self.live is not None:
-            self.repaint()
-            self.live.painted(self.drawn.serial, self.clock.now())
+        self._show_soon()
+
+    def _show_soon(self) -> None:
+        if not self._soon.isActive():
+            self._soon.start()
+
+    def customEvent(self, event: QEvent | None) -> None:  # noqa: N802 - Qt's name
+        """A position is on the screen."""
+        if isinstance(event, _Painted) and self.live is not None:
+            self.live.painted(event.serial, self.clock.now())
 
     def _end(self, message: view.Ended) -> None:
         self.ended = message
@@ -148,7 +172,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
-        self._brief_until_s, self._brief_for = self.clock.now() + BRIEF_S, self.drawn.serial
+        position = self.drawn if self.live is None else self.live.position  # what it led to may not be drawn yet
+        self._brief_until_s, self._brief_for = self.clock.now() + BRIEF_S, position.serial
         self._show_line(text, mood)
 
     def _unbrief(self) -> None:
@@ -185,7 +210,11 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         )
 
     def refresh(self) -> None:
-        """Show what is so now."""
+        """Show what is so now.
+
+        Qt paints it by itself, when Python's other threads can run: the record of an answer does not wait meanwhile.
+        """
+        self._soon.stop()
         if self.controls is not None:
             self.controls.tick(here=self.isActiveWindow())
         seen = self.seen
@@ -198,6 +227,9 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if self._brief_until_s is not None and seen.now_s > self._brief_until_s:
             self._unbrief()
         self._fit()
+        if self.drawn.serial != self._painted:
+            self._painted = self.drawn.serial
+            QCoreApplication.postEvent(self, _Painted(self._painted), _AFTER_PAINT)
 
     def _show_bands(self, seen: view.Seen) -> None:
         found = view.bands(seen)
@@ -258,7 +290,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         """The key of a command went down."""
         if self.controls is not None:
             self.controls.down(name, at_s)
-        self.refresh()
+        self._show_soon()
 
     def up(self, key: str) -> None:
         """A key was let go."""
@@ -271,7 +303,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             self.controls.do(name, press)
         elif name == "stop" and self.ended is not None:
             self.close()
-        self.refresh()
+        self._show_soon()
 
     def hold(self, press: Press) -> None:
         """The button that has to be held went down."""
