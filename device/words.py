@@ -146,6 +146,10 @@ class Effect:
 Drive = Pulse | Effect
 
 
+def _is_name(value: object) -> bool:
+    return isinstance(value, str) and value != ""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
     """The command to fire once: which rendering method, which way the gun points, and how it is driven."""
@@ -155,7 +159,7 @@ class Shot:
     drive: Drive
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.method, str) and self.method):
+        if not _is_name(self.method):
             raise LimitError(f"shot: method is {self.method!r}; it must name a rendering method")
         if self.direction not in DIRECTIONS:
             raise LimitError(f"shot: direction is {self.direction!r}; it must be one of {', '.join(DIRECTIONS)}")

@@ -182,10 +182,8 @@ def power(
     from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.run import simulated_power
     from experiments.design.streams import checked_seed
-    from recoil.arguments import arguments_named, file_or_name, numbers_of, refusal, texts_of
+    from recoil.arguments import arguments_named, file_or_name, numbers_of, refusal, texts_of, whole_number
 
-    if isinstance(studies, bool) or not isinstance(studies, int) or studies < 1:
-        raise refusal("studies", studies, "a whole number from 1, such as 10_000")
     if isinstance(target, bool) or not isinstance(target, int | float):
         raise refusal("target", target, "a number between 0 and 1, such as 0.8")
     request = PowerRequest(
@@ -194,7 +192,7 @@ def power(
         trials=numbers_of("trials", trials),
         effects=numbers_of("effects", effects),
         methods=texts_of("methods", methods, "names", "vibration"),
-        studies=studies,
+        studies=whole_number("studies", studies, "10_000"),
         target=target,
         seed=checked_seed(seed),
     )

@@ -90,8 +90,11 @@ def bench(out: Path, chosen: Sequence[str], request: BenchRequest) -> Bench:
 def physics(request: BenchRequest) -> Measured:
     """Each model with the coil open and shorted after the pulse, one shot at a time and in a batch on one core."""
     cases = [(drive_off, fidelity) for drive_off in OFF_STATES for fidelity in FIDELITIES]
+    rows = []
     with request.progress("bench physics", len(cases)) as tell:
-        rows = [row for case in cases if (row := _measured(*case, request)) and not tell(" ".join(case))]
+        for drive_off, fidelity in cases:
+            rows.append(_measured(drive_off, fidelity, request))
+            tell(f"{drive_off} {fidelity}")
     return Measured(rows=rows, section=_model_section(rows, request), lines=tuple(_lines(rows)))
 
 

@@ -71,11 +71,15 @@ def people_codes(people: Sequence[Hashable], rows: int) -> NDArray[np.intp]:
     return codes
 
 
-def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> PredictorColumns:
-    """The columns of a model. `ValueError`: another number of rows, a constant predictor, predictors that overlap."""
+def _check_named(predictors: object) -> None:
     if not isinstance(predictors, Mapping):
         kind = type(predictors).__name__
         raise ValueError(f"predictors must be columns by their names, {{name: values}}, not a {kind}")
+
+
+def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> PredictorColumns:
+    """The columns of a model. `ValueError`: another number of rows, a constant predictor, predictors that overlap."""
+    _check_named(predictors)
     given = [numbers(values, f"predictor {name!r}") for name, values in predictors.items()]
     for name, array in zip(predictors, given, strict=True):
         if array.shape != (rows,):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -92,7 +92,7 @@ def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> 
         raise ValueError("pairs are described, not tested")
     found = question_scores(design, name, table)
     levels = {one: factor.all_levels for one, factor in design.factors.items() if len(factor.all_levels) > 1}
-    scores = found.people.set_axis([*_conditions(found.people)], axis=1)
+    scores = found.people.set_axis([*_conditions(found.people.columns)], axis=1)
     unit = _unit(design.questions[name])
     return RequestData(scores=scores, trials=found.real, factors=levels, unit=unit, grouped=bool(design.between))
 
@@ -106,7 +106,7 @@ def _unit(question: QuestionConfig) -> str:
     return "right answers" if question.correct is not None else f"answers {question.named_answers[0]}"
 
 
-def _conditions(people: pd.DataFrame) -> Iterator[str]:
+def _conditions(columns: Iterable[object]) -> Iterator[str]:
     """Conditions by their levels."""
-    for levels in people.columns:
+    for levels in columns:
         yield "/".join(map(shown_level, levels if isinstance(levels, tuple) else (levels,)))

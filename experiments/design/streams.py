@@ -28,7 +28,7 @@ def draw_seed() -> int:
     return secrets.randbelow(MAX_SEED + 1)
 
 
-def checked_seed(seed: int) -> int:
+def checked_seed(seed: object) -> int:
     """The seed, if it is one. `ConfigError`: anything else than a whole number that a config may hold."""
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= MAX_SEED:
         raise ConfigError(f"seed = {seed!r}: must be a whole number from 0 to {MAX_SEED}, such as 1")

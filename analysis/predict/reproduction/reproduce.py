@@ -321,8 +321,9 @@ def _other_trials(studies: Drawn, paper: Paper) -> str | None:
         protocol = paper.direction.protocol
         same = studies.trials == (protocol.forward_trials_per_session, protocol.backward_trials_per_session)
         return None if same else f"{name} has other numbers of trials than the paper"
-    scale = paper.preference.scale_min, paper.preference.scale_max
-    return None if (studies.scale.minimum, studies.scale.maximum) == scale else f"{name} has another scale"
+    scale = studies.scale
+    same = scale.minimum == paper.preference.scale_min and scale.maximum == paper.preference.scale_max
+    return None if same else f"{name} has another scale"
 
 
 def reconstructed_people(

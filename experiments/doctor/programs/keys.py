@@ -31,6 +31,10 @@ class Target(QLabel):
         self._loop = loop
         self.stamps: tuple[float, float] | None = None
 
+    def forget(self) -> None:
+        """No key has come yet."""
+        self.stamps = None
+
     def keyPressEvent(self, _: QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
         """Stamp, paint as the console does after an answer, stamp again."""
         came_s = time.monotonic()
@@ -84,7 +88,7 @@ def _one(loop: QEventLoop, injector: Injector, target: Target) -> tuple[float, f
     QCoreApplication.processEvents()
     if not target.isActiveWindow():
         return None
-    target.stamps = None
+    target.forget()
     start_s = injector.press()
     _turn(loop, PATIENCE_MS)
     if target.stamps is None:

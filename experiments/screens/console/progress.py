@@ -8,9 +8,8 @@ from datetime import datetime, timedelta
 from itertools import pairwise
 
 from device import GunStatus
-from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
-from experiments.design.stimuli import damper, settings
+from experiments.design.stimuli import settings
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
@@ -169,10 +168,7 @@ def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
 
 def _set_by_hand(about: About, trial: Trial) -> dict[str, str]:
     """What is set by hand for a trial, or for its first interval."""
-    config, gun = about.setup.config, about.setup.gun
-    if isinstance(config, DesignConfig):
-        return dict(settings(config, gun, trial.levels_at(0) or trial.levels))
-    return dict(damper(gun, trial.method))
+    return dict(settings(about.setup.config, about.setup.gun, trial.levels_at(0) or trial.levels))
 
 
 def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
