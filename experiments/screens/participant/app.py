@@ -74,6 +74,10 @@ def run_program(look: messages.Look, heard: BinaryIO, said: BinaryIO) -> int:
     except KeyboardInterrupt:
         wire.say(messages.ScreenFailed(message="it was interrupted from the keyboard (Ctrl-C)"))
         return 130
+    except ModuleNotFoundError as error:
+        needs = "the extra `gui`, on Python 3.11 or 3.12, as PsychoPy allows no later one"
+        wire.say(messages.ScreenFailed(message=f"{error.name} is not installed: this screen needs {needs}"))
+        return 1
     except SystemExit as error:  # PsychoPy ends the program where others raise
         wire.say(messages.ScreenFailed(message=f"PsychoPy ended the program ({error.code})"))
         return 1
