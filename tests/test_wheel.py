@@ -42,6 +42,8 @@ def test_the_wheel_holds_the_four_packages_and_the_configs_and_nothing_else(whee
         "experiments/screens/console/console.qss",
     ):
         assert name in names
+    assert any(name.endswith(".dist-info/licenses/LICENSE") for name in names)
+    assert not [name for name in names if "test" in Path(name).name]
 
 
 def test_installed_elsewhere_recoil_works_from_any_folder(wheel: Path, tmp_path: Path) -> None:
