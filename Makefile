@@ -1,5 +1,5 @@
 # Two commands for a fresh machine: `make reproduce` and `make test`. Both set up what they need.
-.PHONY: setup full reproduce test quick coverage soak lock reference clean
+.PHONY: setup full reproduce lint test quick checkers coverage soak lock reference clean
 
 setup: .venv/.ready
 
@@ -15,6 +15,10 @@ full: .venv/.ready-full
 reproduce: setup
 	.venv/bin/recoil reproduce
 
+# Style, types and contracts of imports
+lint: full
+	scripts/lint
+
 test: full
 	scripts/system-packages
 	scripts/test
@@ -22,6 +26,10 @@ test: full
 # What a developer runs every few minutes: all but the tests that are marked slow
 quick: full
 	scripts/test --numprocesses $(shell nproc) -m "not soak and not slow"
+
+# What others' programs say of the package: its metadata, wheel and citation
+checkers: setup
+	scripts/checkers
 
 # Lines and branches that the tests reach, the programs that they start included
 coverage: full
