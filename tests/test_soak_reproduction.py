@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import shutil
 import statistics as st
 import subprocess
 import time
@@ -95,7 +94,7 @@ def test_plans_over_10_000_seeds(soak: Soak) -> None:
 def test_golden_plan_hashes_hold_elsewhere(tmp_path: Path, soak: Soak, python: str, numpy: str) -> None:
     count = len(json.loads((ROOT / "tests" / "golden_plans.json").read_text(encoding="utf-8")))
     all_hold = f"{count} of {count}"
-    uv = shutil.which("uv") or str(ROOT / ".tools" / "bin" / "uv")
+    uv = ROOT / "scripts" / "uv"
     environment = tmp_path / "venv"
     if subprocess.run([uv, "venv", "-q", "--python", python, environment], check=False).returncode:
         soak(f"golden plan hashes on Python {python}, numpy {numpy}", "not tried", all_hold, "no such Python here")
