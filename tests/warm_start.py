@@ -23,6 +23,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
@@ -78,8 +79,10 @@ def _start(address: Path) -> None:
         words = [sys.executable, "-m", "tests.warm_start", str(address)]
         environment = os.environ | {"PYTHONPATH": str(CLIENT.parent.parent)}
         nowhere = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (0, 1)]
-        os.posix_spawn(sys.executable, words, environment, file_actions=nowhere, setsid=True)
+        server = os.posix_spawn(sys.executable, words, environment, file_actions=nowhere, setsid=True)
         while not address.exists():
+            if os.waitpid(server, os.WNOHANG) != (0, 0):
+                raise RuntimeError("the server of warm starts ended before it served: its error is printed above")
             time.sleep(0.02)
 
 
@@ -202,7 +205,8 @@ def _code(program: Callable[[list[str]], None], words: list[str]) -> int:
 def main(address: Path, owner: int) -> NoReturn:
     """Import everything, then serve until the owner ends."""
     for name in PRELOADED:
-        importlib.import_module(name)
+        with suppress(ModuleNotFoundError):  # of an extra that is not installed: a program that needs it says so itself
+            importlib.import_module(name)
     pdfs.leave_out()
     being = address.with_name("being-made")
     with socket.socket(socket.AF_UNIX) as door:
