@@ -38,7 +38,7 @@ from experiments.record.replay import RunPosition
 from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
 from experiments.session.steps import Answered, Describe, Session
-from experiments.study import balance, folders, register
+from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
 
@@ -147,7 +147,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
         session, screen = design_session(plan, setup), make_screen(setup, plan, clock)
         with _open(place, before, clock) as journal:
-            head = _circumstances(setup, gun, clock)
+            head = _circumstances(request, gun, clock)
             if before is None:
                 position = _begin(session, journal, request, plan, head)
             else:
@@ -276,17 +276,20 @@ def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:
     return Journal.create(place.journal, clock)
 
 
-def _circumstances(setup: Setup[DesignConfig], gun: Gun, clock: Clock) -> dict[str, object]:
-    """What a journal says of how a run began, or went on.
+def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, object]:
+    """What a journal says of how a run began, or went on; practices and synthetic runs name the preregistration too.
 
     The experimenter cannot be kept from knowing the direction, as they turn the gun, and dampers, set by hand.
     """
+    setup = request.setup
+    frozen = preregistration.in_force(preregistration.study_folder(request.results, setup.source))
     dampers = [f"method {name}" for name in setup.config.methods if setup.gun.methods[name].damper]
     return {
         "provenance": provenance(),
         "gun": asdict(gun.identify()),
         "clock": clock.name,
         "experimenter_knows": ["direction", *dampers, *by_hand(setup.config)],
+        **({"preregistration_sha256": frozen} if frozen else {}),
     }
 
 

@@ -30,6 +30,7 @@ COMMANDS = (
     sessions.check,
     sessions.run,
     sessions.study,
+    sessions.freeze,
     sessions.rebuild,
     numbers.analyze,
     numbers.audit,

@@ -165,6 +165,7 @@ Edit the configs here; every number of the protocol is in them.
 
     recoil check study.toml                                   the design, the orders, the duration, the limits
     recoil reproduce --study study.toml --out simulated       the whole study with synthetic participants
+    recoil freeze .                                           a preregistration, whose hash every later run carries
     recoil doctor                                             the rig's self-test
     recoil run direction.toml --screen console                sessions at the console, from its start window
     recoil run direction.toml --participant P01               a session on a terminal
@@ -181,6 +182,7 @@ _README_OF_DESIGN = """# {title}
 
     recoil check {name}.toml                                  the plan as a Methods section, cells, orders, duration
     recoil run {name}.toml --participant S01 --screen synthetic --results simulated    one simulated run
+    recoil freeze .                                           a preregistration, whose hash every later run carries
     recoil doctor                                             the rig's self-test
     recoil run {name}.toml --screen console                   sessions at the console, from its start window
     recoil study .                                            who is done, in progress, excluded, next

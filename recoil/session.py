@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from device.serial_gun.gun import speed_of
+from device.words import few_of_each
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -21,8 +22,9 @@ from experiments.run import Again, Finished, ParticipantOptions, RunRequest, Scr
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered
-from experiments.study.balance import unread
+from experiments.study.balance import journals, unread
 from experiments.study.folders import Place, PlaceError, check_code, place, set_aside_file
+from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
 
 
@@ -35,7 +37,7 @@ def run_session(request: RunRequest) -> Place:
         raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
         _check_resumable(request)
-    _say_unread(request)
+    _say_beforehand(request)
     try:
         return _SCREENS[request.screen](request).place
     except RunStopped as stop:
@@ -44,9 +46,14 @@ def run_session(request: RunRequest) -> Place:
         raise KeyboardInterrupt from stop
 
 
-def _say_unread(request: RunRequest) -> None:
-    """Whose journals cannot be read: they are no reason to send this participant home."""
-    for message in unread(request.setup, request.results, read_register(request.results)):
+def _say_beforehand(request: RunRequest) -> None:
+    """Whose journals cannot be read, and what is not as it was frozen: no reason to send this participant home."""
+    setup, results = request.setup, request.results
+    there = journals(results, setup.config.experiment)
+    for message in (
+        *unread(setup, results, read_register(results)),
+        *few_of_each(run_warnings(setup, results, there)),
+    ):
         with suppress(OSError):
             sys.stderr.write(f"recoil: {message}\n")
 
@@ -139,6 +146,7 @@ def run_lab_day(request: RunRequest) -> None:
             "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"
         )
     check_pace("console", request.gun)
+    _say_beforehand(request)
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
     try:

@@ -94,6 +94,7 @@ def study_json(found: StudyStatus) -> dict[str, object]:
         "participants": [_participant(found, one) for one in found.overview.participants],
         "next": coming
         and {"participant_id": coming.participant_id, "new": coming.new, "orders": found.overview.orders},
+        "preregistration": found.overview.frozen.record(),
         "problems": list(found.overview.problems),
     }
 
@@ -124,7 +125,7 @@ def study_text(found: StudyStatus) -> str:
     section = Section(
         title=found.study.config.title,
         tables=(Table(caption="", header=header, rows=rows),),
-        items=(*_count_lines(found), *_next_lines(found)),
+        items=(*_count_lines(found), *found.overview.frozen.lines(), *_next_lines(found)),
     )
     return with_tables(section)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from analysis.paper.paper import load_paper
-from analysis.predict.check_design import DesignCheck, check_design, design_sections
+from analysis.predict.check_design import AS_FROZEN, DesignCheck, check_design, design_sections
 from analysis.report.section import Section
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text, with_tables
@@ -15,6 +16,8 @@ from experiments.config.door import ConfigError, EligibilityConfig, at_key, part
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import check_methods, find, load_gun, load_setup, load_study
+from experiments.study.folders import stand_of
+from experiments.study.preregistration import JOURNALS, Standing, carried_by, numbers_there
 
 EXAMPLE_SEED = 1
 """Orders are shown for this seed if the config gives none; a run without a seed draws its own."""
@@ -28,6 +31,7 @@ class StudyCheck:
     participants: int
     eligibility: EligibilityConfig
     experiments: tuple[DesignCheck, ...]
+    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +41,7 @@ class GunCheck:
     gun: str
     methods: tuple[str, ...]
     assumed: tuple[str, ...]
+    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,13 +50,29 @@ class PaperCheck:
 
     paper: str
     experiments: dict[str, int]
+    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
 
 
 AnyCheck = DesignCheck | StudyCheck | GunCheck | PaperCheck
 
 
 def check(name: str, seed: int | None, participants: int) -> AnyCheck:
-    """What any config means. `ConfigError` names what is wrong with it."""
+    """What any config means, and how it stands beside its preregistration. `ConfigError` names what is wrong."""
+    found, path = _meaning(name, seed, participants), find(name)
+    carried = [*carried_by(path.parent.glob(JOURNALS))] if isinstance(found, StudyCheck) else []
+    if not carried and not numbers_there(path.parent):
+        return found
+    stand = stand_of(path.parent, carried)
+    return replace(found, frozen=stand if isinstance(found, StudyCheck) else stand.of_files(_files(found, path)))
+
+
+def _files(found: AnyCheck, path: Path) -> list[str]:
+    """The files that a config stands for, by their place beside the study."""
+    gun = load_setup(path).config.gun if isinstance(found, DesignCheck) else path.name
+    return [path.name, Path(os.path.normpath(gun)).as_posix()]
+
+
+def _meaning(name: str, seed: int | None, participants: int) -> AnyCheck:
     path = find(name)
     table = read_toml(path)
     if "design" in table or "factors" in table:
@@ -96,8 +117,13 @@ def _design(setup: Setup[DesignConfig], seed: int | None, codes: Sequence[str]) 
 def check_text(found: AnyCheck) -> str:
     """What was found, for a person."""
     if isinstance(found, GunCheck | PaperCheck):
-        return "\n".join(f"{one.name}: {plain(getattr(found, one.name))}" for one in fields(found))
-    return "\n\n".join(with_tables(one) if one.tables else in_text(one) for one in sections(found))
+        named = (one.name for one in fields(found) if one.name != "frozen")
+        texts = ["\n".join(f"{name}: {plain(getattr(found, name))}" for name in named)]
+    else:
+        texts = [with_tables(one) if one.tables else in_text(one) for one in sections(found)]
+    if found.frozen is not None:
+        texts.append(in_text(Section(title="Preregistration", items=(*found.frozen.problems, *found.frozen.lines()))))
+    return "\n\n".join(texts)
 
 
 def sections(found: DesignCheck | StudyCheck) -> tuple[Section, ...]:

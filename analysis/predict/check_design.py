@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from analysis.predict.drawn import RatingStudies, studies_of
 from analysis.predict.exposure import Exposure, exposure
 from analysis.predict.synthetic_studies import percepts_of_methods
 from analysis.report.section import Section, Table
-from analysis.report.serial import OPTIONAL
+from analysis.report.serial import OPTIONAL, written
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
 from device.methods import Method
 from device.parameters import GunParameters
@@ -35,6 +36,7 @@ from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
 from experiments.screens.synthetic import synthetic_participant_of
+from experiments.study.preregistration import Standing
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 
@@ -42,6 +44,10 @@ _MOST_CELLS = 60
 """So many cells are listed."""
 _EXPECTED_EVEN = 5
 """Of fewer participants nobody expects first positions to be even."""
+
+
+AS_FROZEN: Mapping[str, Any] = OPTIONAL | written(Standing.record, "preregistration")
+"""Metadata of how a config stands beside its preregistration, which is left out where there is none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +86,7 @@ class DesignCheck:
     felt_forward_rates: dict[str, dict[str, float]]
     warnings: tuple[str, ...]
     assumed: tuple[str, ...]
+    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
 
 
 def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) -> DesignCheck:

@@ -18,6 +18,7 @@ from analysis.paper.paper import Prediction, load_paper
 from analysis.report.terminal import Progress, Tell, unseen, untold
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
+from analysis.summary.deviations import AnalysisFiles, deviations
 from analysis.summary.participation import exclusion_lines, participation
 from analysis.summary.request_data import answers_to
 from analysis.summary.requests import Requests
@@ -51,6 +52,13 @@ class Request:
     fits: bool = False
     requests: Path | None = None
     include_synthetic: bool = False
+
+    @property
+    def files(self) -> AnalysisFiles:
+        """What is held against a preregistration."""
+        return AnalysisFiles(
+            rules=self.rules, requests=self.requests, codebook=self.codebook, paper=self.paper, fits=self.fits
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +98,8 @@ def analyze(
             statistics = replace(statistics, remarks=coded)
         if asked is not None and request.requests is not None:
             statistics = replace(statistics, requested=answers_to(asked, request.requests, main.logs))
+        frozen, edited = deviations(parts[0], request.files)
+        statistics = replace(statistics, preregistration=frozen or None)
         storage.make_folder(request.out)
         report = ReportData(
             title=report_title(request.paths),
@@ -109,7 +119,7 @@ def analyze(
     for one in others:
         storage.make_folder(request.out / folder_of(one.logs.kind))
         _write_tables(request.out / folder_of(one.logs.kind), one)
-    return statistics, tuple(_said(logs, statistics))
+    return statistics, (*edited, *_said(logs, statistics))
 
 
 def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:

@@ -264,7 +264,7 @@ def _comparisons(
         yield from _factorial(names, people, group)
 
 
-_MOST_FACTORS = 4
+MOST_FACTORS = 4
 """Of more factors within people there are more interactions than anybody reads."""
 
 
@@ -277,8 +277,8 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
         return "more than two answers and none is right: they are counted"
     if len(design.between) > 1:
         return f"several factors between people are {instead}"
-    if len(_sizes(people)) > _MOST_FACTORS:
-        return f"more than {_MOST_FACTORS} factors within people are {instead}"
+    if len(_sizes(people)) > MOST_FACTORS:
+        return f"more than {MOST_FACTORS} factors within people are {instead}"
     if math.prod(_sizes(people)) != people.shape[1]:
         return f"factors that are nested, not crossed, are {instead}"
     return "fewer than two people have all conditions" if len(people) < 2 else ""
@@ -323,13 +323,13 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
         yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)
 
 
-_MOST_COMPARED = 10
+MOST_COMPARED = 10
 """Of more conditions the pairs fill pages that nobody reads."""
 
 
 def _pairs(scores: FloatArray, labels: Sequence[str], question: QuestionConfig) -> Iterator[DesignTest]:
     """Tukey's test of every two conditions, on the error of the ANOVA; of numbers, of their logarithms."""
-    if question.kind == "ranking" or not 2 < len(labels) <= _MOST_COMPARED or rm_anova(scores).reason:
+    if question.kind == "ranking" or not 2 < len(labels) <= MOST_COMPARED or rm_anova(scores).reason:
         return
     for pair in rm_tukey_hsd(scores, labels):
         yield DesignTest(

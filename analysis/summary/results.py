@@ -19,6 +19,7 @@ from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import EffectSize, Normality, Sphericity
 from analysis.stats.logit_model import Clustering, LogitModel
 from analysis.stats.paired import PairedT, SignedRanks
+from analysis.summary.deviations import StudyDeviations
 from analysis.summary.participation import Participation
 from analysis.summary.remarks_coding import CodedRemarks
 from analysis.summary.requests import Requested
@@ -405,6 +406,7 @@ class StudyStatistics(NotebookResult):
     rules: RulesApplied | None = field(default=None, metadata=OPTIONAL)
     remarks: CodedRemarks | None = field(default=None, metadata=OPTIONAL)
     requested: tuple[Requested, ...] | None = field(default=None, metadata=OPTIONAL)
+    preregistration: tuple[StudyDeviations, ...] | None = field(default=None, metadata=OPTIONAL)
     data_kind: DataKind = "real"
     kept_apart: Mapping[DataKind, StudyStatistics] | None = field(default=None, metadata=OPTIONAL)
 

@@ -236,8 +236,23 @@ _RULES: dict[str, Fact] = {
 """Which fact each rule is about."""
 
 
+class PreregistrationConfig(Model):
+    """What is set beforehand beside the designs: `recoil freeze` writes it down with them.
+
+    `stop_rule`: when nobody comes any more; without, when the study has its participants. `rules`, `requests` and
+    `codebook` are the files for the same options of `recoil analyze`, beside the study; `fits` is its option `--fits`.
+    """
+
+    hypotheses: tuple[Text, ...] = ()
+    stop_rule: Text | None = None
+    rules: Text | None = None
+    requests: Text | None = None
+    codebook: Text | None = None
+    fits: bool = False
+
+
 class StudyConfig(Model):
-    """A study: how many people, which experiments, who may take part, and what to compare with."""
+    """A study: how many people, which experiments, who may take part, what to compare with, and what is set before."""
 
     title: Text
     participants: Annotated[int, Field(ge=1, le=999)]
@@ -246,6 +261,7 @@ class StudyConfig(Model):
     paper: Text | None = None
     replications: Annotated[int, Field(ge=0, le=1_000_000)] = 2000
     eligibility: EligibilityConfig = EligibilityConfig()
+    preregistration: PreregistrationConfig = PreregistrationConfig()
 
     def codes(self) -> list[str]:
         """The participants' codes, P01 onwards."""

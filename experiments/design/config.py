@@ -146,7 +146,10 @@ _COMMON_COLUMNS = frozenset(
 )
 
 
-_TAKEN = ("excluded", "participation", "remarks", "rules", "studies", "versions", "warnings")
+_TAKEN = (
+    *("excluded", "labels", "participation", "preregistration", "remarks", "requested", "rules", "studies"),
+    *("versions", "warnings"),
+)
 """What `statistics.json` has beside the designs by their names."""
 
 

@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Self, TypeVar, get_args
 
@@ -68,6 +68,7 @@ class Head(Record):
     """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes.
 
     `laws_json`: how synthetic people answer the design, `None` where nothing says so. `participant`: who was to do it.
+    `preregistration_sha256` is empty where the study was not frozen. `provenance`: versions, commit and system.
     """
 
     path: Path
@@ -78,6 +79,8 @@ class Head(Record):
     laws_json: object = None
     participant: ParticipantKind = "person"
     gun: Identity | None = None
+    preregistration_sha256: str = ""
+    provenance: dict[str, str] = field(default_factory=dict)
 
     @property
     def plan(self) -> Plan:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from device.words import RecoilError
-from experiments.config.door import StudyConfig
+from experiments.config.door import ConfigError, StudyConfig
 from experiments.config.findings import CODE
 from experiments.config.setup import Setup
 from experiments.design import planning
@@ -28,6 +28,15 @@ from experiments.runner import gun_name
 from experiments.session.history import answered
 from experiments.study import register
 from experiments.study.balance import group_of_next_run, row_of_next_run
+from experiments.study.preregistration import (
+    STUDY_FILE,
+    Standing,
+    files_now,
+    missing,
+    read_chain,
+    standing,
+    study_folder,
+)
 from experiments.study.register import Register
 from experiments.study.study import Member, NextParticipant, Participant, RunProgress, RunState, by_code, who_is_next
 
@@ -155,13 +164,14 @@ class Overview:
     """The participants in order of their codes, who comes next, in which orders, and what could not be read.
 
     `orders` are the methods of the next participant's open runs; `None` where chance decides when the run begins, or
-    where the rows that are taken cannot be read.
+    where the rows that are taken cannot be read. `frozen`: whether the study is, and what has changed since.
     """
 
     participants: tuple[Participant, ...]
     next: NextParticipant | None
     orders: dict[str, tuple[str, ...] | None]
     problems: tuple[str, ...]
+    frozen: Standing
 
 
 def open_study(folder: Path) -> StudyFolder:
@@ -198,8 +208,9 @@ def overview(study: StudyFolder) -> Overview:
     people = tuple(look.participants())
     next_one = who_is_next(people, study.config, study.experiments)
     orders_ahead = look.orders(next_one)
-    problems = tuple(dict.fromkeys(filter(None, (look.registered.problem, *look.problems))))
-    return Overview(participants=people, next=next_one, orders=orders_ahead, problems=problems)
+    frozen = look.frozen()
+    problems = tuple(dict.fromkeys(filter(None, (look.registered.problem, *look.problems, *frozen.problems))))
+    return Overview(participants=people, next=next_one, orders=orders_ahead, problems=problems, frozen=frozen)
 
 
 def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple[str, ...]]:
@@ -211,6 +222,18 @@ def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple
     if look.registered.problem:
         raise JournalError(look.registered.problem)
     return look.participant(participant_id), tuple(look.problems)
+
+
+def stand_of(folder: Path, carried: Sequence[tuple[str, str]] = ()) -> Standing:
+    """How the study of a folder stands beside what was frozen; that its files cannot be read is among the problems."""
+    try:
+        if not (folder / STUDY_FILE).is_file():
+            raise ConfigError(f"{folder / STUDY_FILE}: is missing, so nothing says what has changed in it; put it back")
+        study = _loaded(str(folder / STUDY_FILE), folder / "results")
+    except ConfigError as error:
+        chain = read_chain(folder)
+        return Standing(chain=chain, missing=(*missing(chain, carried), *str(error).splitlines()))
+    return standing(folder, lambda: files_now(study.source, study.config, study.setups), carried)
 
 
 class _Look:
@@ -284,6 +307,14 @@ class _Look:
         if isinstance(seen, JournalError):
             raise seen
         return seen
+
+    def frozen(self) -> Standing:
+        """Whether the study is frozen, by its files and by the journals that were looked at."""
+        study = self._study
+        heads = [head for head in self._heads.values() if isinstance(head, Head)]
+        carried = [(head.plan.participant_id, head.preregistration_sha256) for head in heads]
+        folder = study_folder(study.results, study.source)
+        return standing(folder, lambda: files_now(study.source, study.config, study.setups), carried)
 
     def orders(self, next_one: NextParticipant | None) -> dict[str, tuple[str, ...] | None]:
         """The methods of who is next, by experiment; `None` where chance decides, or rows cannot be read."""

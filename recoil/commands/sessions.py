@@ -31,7 +31,7 @@ def check(
 
     found, refused = each_of(configs, lambda name: feature.check(name, seed, participants))
     show(found if len(found) > 1 else found[0], "\n\n".join(map(feature.check_text, found)), as_json)
-    raise end(exceptions=refused > 0)
+    raise end(exceptions=refused > 0 or any(one.frozen and one.frozen.problems for one in found))
 
 
 ParticipantOption = Annotated[
@@ -125,6 +125,20 @@ def study(
         say(f"recoil: {message}")
     show(feature.study_json(found), feature.study_text(found), as_json)
     raise end(exceptions=bool(found.overview.problems))
+
+
+def freeze(
+    study: Annotated[Path, typer.Argument(metavar="STUDY", help="The study's folder.")],
+    reason: Annotated[str, typer.Option(help="Of an amendment: why; never a name.")] = "",
+    as_json: AsJsonOption = False,
+) -> None:
+    """Write a preregistration, whose hash every later journal carries; if something has changed, an amendment."""
+    from analysis.archive.preregistration import freeze as feature
+    from analysis.archive.preregistration import frozen_json, frozen_text
+    from experiments.clock import RealClock
+
+    found = feature(study, reason, RealClock())
+    show(frozen_json(found), frozen_text(found), as_json)
 
 
 def rebuild(

@@ -20,6 +20,7 @@ from analysis.summary.sections.glance import glance_section
 from analysis.summary.sections.manuscript import manuscript_section
 from analysis.summary.sections.participants import all_left_out, notices, participants_section, shown_names
 from analysis.summary.sections.pictures import write_figures
+from analysis.summary.sections.preregistration import deviations_sections
 from analysis.summary.sections.published import odds_section, published_sections, shot_section
 from analysis.summary.sections.quality import quality_section, undefined_numbers
 from analysis.summary.sections.requested import requested_sections
@@ -77,6 +78,7 @@ def _kept_apart(report: ReportData) -> Iterator[Section]:
 
 READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     participants_section,
+    deviations_sections,
     glance_section,
     direction_section,
     preference_section,

@@ -1,0 +1,323 @@
+"""What a study did otherwise than it was frozen: every key, run, person, exclusion, rule and test that differs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from pydantic import JsonValue
+
+from analysis.logs.journals import RunFile
+from analysis.logs.reading import Logs
+from experiments.config.door import PreregistrationConfig, read_toml
+from experiments.record import journal
+from experiments.record.journal import Head, JournalError
+from experiments.record.provenance import recoil_version
+from experiments.study.folders import stand_of
+from experiments.study.preregistration import (
+    Chain,
+    Preregistration,
+    Standing,
+    Values,
+    changed_keys,
+    changes_of_run,
+    read_chain,
+)
+from experiments.study.register import Register, read_register
+from experiments.study.study import eligible
+
+DeviationKind = Literal[
+    "preregistration", "amended", "changed since", "run", "participants", "exclusion", "analysis", "version"
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation:
+    """One thing that differs: what was frozen, what there is instead, and of whom, as far as that is said.
+
+    `None` stands where there is nothing.
+    """
+
+    kind: DeviationKind
+    what: str
+    frozen: JsonValue = None
+    instead: JsonValue = None
+    who: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenAs:
+    """A preregistration of a study, by its hash."""
+
+    number: int
+    sha256: str
+    written_utc: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyDeviations:
+    """The preregistrations of a study that can be trusted, and every deviation from them."""
+
+    study: str
+    preregistrations: tuple[FrozenAs, ...]
+    deviations: tuple[Deviation, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalysisFiles:
+    """The files that an analysis was made with, and whether with fits of the diffusion model."""
+
+    rules: Path | None = None
+    requests: Path | None = None
+    codebook: Path | None = None
+    paper: Path | None = None
+    fits: bool = False
+
+
+def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, ...], tuple[str, ...]]:
+    """The deviations of each study that is frozen, or whose journals name a preregistration.
+
+    Beside them what was edited or is missing, with its place, for whoever made the analysis.
+    """
+    found, said = list[StudyDeviations](), list[str]()
+    for results in dict.fromkeys([*(run.study for run in logs.runs), *logs.names]):
+        looked = _Looked.at(Path(results), logs) if Path(results).is_absolute() else None
+        if looked is not None:
+            said += looked.stand.problems
+            found.append(_of_study(looked, used))
+    return tuple(found), tuple(said)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Looked:
+    """One study as it was found: its register, the heads of its journals, and how it stands."""
+
+    results: Path
+    logs: Logs
+    stand: Standing
+    registered: Register
+    heads: tuple[tuple[RunFile, Head], ...]
+
+    @classmethod
+    def at(cls, results: Path, logs: Logs) -> _Looked | None:
+        """`None` of a study that was never frozen."""
+        runs = [run for run in logs.runs if run.study == str(results)]
+        chain = read_chain(results.parent)
+        if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
+            return None
+        heads = [(run, head) for run in runs if (head := _head(run)) is not None]
+        carried = [(head.plan.participant_id, head.preregistration_sha256) for _, head in heads]
+        mine = [one for one in heads if logs.kind == "synthetic" or one[1].participant == "person"]
+        return cls(
+            results=results,
+            logs=logs,
+            stand=stand_of(results.parent, carried),
+            registered=read_register(results),
+            heads=tuple(sorted(mine, key=lambda one: one[1].utc)),
+        )
+
+    @property
+    def chain(self) -> Chain:
+        return self.stand.chain
+
+    @cached_property
+    def excluded(self) -> dict[str, str]:
+        """Who is excluded by hand, with the reason."""
+        members = self.registered.members.items()
+        return {code: member.excluded for code, member in members if member.excluded is not None}
+
+
+def _names_one(path: str) -> bool:
+    """Whether a journal names a preregistration: a look that is cheap enough for ten thousand of them."""
+    try:
+        with Path(path).open("rb") as file:
+            return b'"preregistration_sha256":' in file.readline()
+    except OSError:
+        return False
+
+
+def _head(run: RunFile) -> Head | None:
+    try:
+        return journal.head(Path(run.path))
+    except JournalError:  # whose journal cannot be read is said elsewhere
+        return None
+
+
+def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
+    last = looked.chain.last
+    listed = [*_problems(looked)]
+    if last is not None:
+        listed += [*_amended(looked.chain), *_changed(looked.stand), *_runs(looked, last)]
+        listed += [*_participants(looked, last), *_exclusions(looked), *_analysis(last, used)]
+    return StudyDeviations(
+        study=looked.logs.names.get(str(looked.results), looked.results.parent.name),
+        preregistrations=tuple(
+            FrozenAs(number=one.number, sha256=one.sha256, written_utc=one.written_utc) for one in looked.chain.every
+        ),
+        deviations=tuple(listed),
+    )
+
+
+def _problems(looked: _Looked) -> Iterator[Deviation]:
+    """What was edited or is missing, without the place on this machine."""
+    folder = looked.chain.folder
+    for text in looked.stand.problems:
+        yield Deviation(kind="preregistration", what=text.replace(f"{folder}/", "").replace(str(folder), "STUDY"))
+
+
+def _amended(chain: Chain) -> Iterator[Deviation]:
+    for one in chain.every[1:]:
+        when = f"preregistration {one.number} of {one.written_utc}, {len(one.begun)} runs begun by then"
+        why = f": {one.reason}" if one.reason else ""
+        for change in one.changes:
+            what = f"{change.file}: {change.key} ({when}{why})"
+            yield Deviation(kind="amended", what=what, frozen=change.frozen, instead=change.now)
+
+
+def _changed(stand: Standing) -> Iterator[Deviation]:
+    for change in stand.changes:
+        what = f"{change.file}: {change.key}"
+        yield Deviation(kind="changed since", what=what, frozen=change.frozen, instead=change.now)
+
+
+# the runs
+
+
+def _runs(looked: _Looked, last: Preregistration) -> Iterator[Deviation]:
+    """What runs did otherwise: each difference once, with everybody of whom it holds."""
+    found: dict[str, Deviation] = {}
+    for run, head in looked.heads:
+        if run.kind != "practice":
+            for one in _of_run(looked.chain, last, head):
+                key = repr(one)
+                who = (*found[key].who, head.plan.participant_id) if key in found else (head.plan.participant_id,)
+                found[key] = replace(one, who=tuple(dict.fromkeys(who)))
+    yield from found.values()
+
+
+def _of_run(chain: Chain, last: Preregistration, head: Head) -> Iterator[Deviation]:
+    own = chain.by_hash(head.preregistration_sha256)
+    name = head.plan.experiment
+    yield from _named_otherwise(chain, own, head)
+    frozen = own or last
+    for change in changes_of_run(frozen, head.setup_json):
+        what = f"run of {name}, {change.file}: {change.key}"
+        yield Deviation(kind="run", what=what, frozen=change.frozen, instead=change.now)
+    yield from _version(f"Recoil in a run of {name}", frozen, head.provenance.get("recoil", "unknown"))
+
+
+def _named_otherwise(chain: Chain, own: Preregistration | None, head: Head) -> Iterator[Deviation]:
+    """A run that began before, or under none, another or an earlier preregistration."""
+    first, named, what = chain.every[0], head.preregistration_sha256, f"run of {head.plan.experiment}"
+    if own is None and not named and head.utc < first.written_utc:
+        yield Deviation(kind="run", what=f"{what} begun before the freeze", frozen=first.written_utc, instead=head.utc)
+    elif own is None:
+        yield Deviation(
+            kind="run",
+            what=f"{what} under {'another preregistration' if named else 'no preregistration'}",
+            frozen=first.sha256,
+            instead=named or None,
+        )
+    elif later := [one for one in chain.every if one.number > own.number and one.written_utc < head.utc]:
+        what = f"{what} under an earlier preregistration than was in force"
+        yield Deviation(kind="run", what=what, frozen=later[-1].number, instead=own.number)
+
+
+def _version(what: str, frozen: Preregistration, now: str) -> Iterator[Deviation]:
+    then = frozen.provenance.get("recoil", "unknown")
+    if then != now:
+        yield Deviation(kind="version", what=what, frozen=then, instead=now)
+
+
+# the people
+
+
+def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]:
+    study = last.study
+    for experiment in dict.fromkeys(str(last.files[file].get("design")) for file in study.experiments):
+        done = _finished(looked, experiment)
+        if len(done) != study.participants:
+            yield Deviation(
+                kind="participants",
+                what=f"participants who finished {experiment}",
+                frozen=study.participants,
+                instead=len(done),
+                who=tuple(done[study.participants :]),
+            )
+    for code, member in looked.registered.members.items():
+        for reason in () if member.facts is None else eligible(member.facts, study.eligibility):
+            yield Deviation(kind="participants", what=f"took part, not eligible: {reason}", who=(code,))
+
+
+def _finished(looked: _Looked, experiment: str) -> list[str]:
+    """Who finished an experiment and is not excluded by hand, in the order in which they began."""
+    begun = {one.file.path for one in looked.logs.begun}
+    return [
+        run.participant
+        for run, _ in looked.heads
+        if run.kind == "run" and run.experiment == experiment
+        if run.path not in begun and run.participant not in looked.excluded
+    ]
+
+
+def _exclusions(looked: _Looked) -> Iterator[Deviation]:
+    """Exclusions by hand, logs that cannot be used, and runs that were set aside."""
+    for code, reason in looked.excluded.items():
+        yield Deviation(kind="exclusion", what=f"excluded by hand: {reason}", who=(code,))
+    for run, _ in looked.heads:
+        if run.kind == "set aside":
+            what = f"an unfinished run of {run.experiment} was set aside"
+            yield Deviation(kind="exclusion", what=what, who=(run.participant,))
+    mine = {(run.participant, run.experiment) for run, _ in looked.heads}
+    for problem in looked.logs.problems:
+        person = problem.participant, problem.experiment
+        if problem.study == str(looked.results) and person in mine and problem.participant not in looked.excluded:
+            why = problem.message.partition(";")[0]
+            yield Deviation(kind="exclusion", what=f"log of {problem.experiment} not used: {why}", who=person[:1])
+
+
+# the analysis
+
+
+def _analysis(last: Preregistration, used: AnalysisFiles) -> Iterator[Deviation]:
+    """Rules and codes that differ, tests that were added or left out, and another version of Recoil."""
+    own = last.study.preregistration
+    yield from _file(last, "--rules", own.rules, used.rules)
+    yield from _file(last, "--codebook", own.codebook, used.codebook)
+    if last.study.paper is not None and used.paper is not None:
+        yield from _file(last, "--paper", last.study.paper, used.paper)
+    yield from _requests(last, own, used)
+    if own.fits != used.fits:
+        yield Deviation(kind="analysis", what="--fits: the diffusion model", frozen=own.fits, instead=used.fits)
+    yield from _version("Recoil in this analysis", last, recoil_version())
+
+
+def _file(last: Preregistration, option: str, name: str | None, path: Path | None) -> Iterator[Deviation]:
+    if path is None:
+        if name is not None:
+            yield Deviation(kind="analysis", what=f"{option} was not given", frozen=name)
+        return
+    frozen: Values = {} if name is None else last.files.get(name, {})
+    for change in changed_keys(path.name, frozen, read_toml(path)):
+        what = f"{option} {path.name}: {change.key}"
+        yield Deviation(kind="analysis", what=what, frozen=change.frozen, instead=change.now)
+
+
+def _requests(last: Preregistration, own: PreregistrationConfig, used: AnalysisFiles) -> Iterator[Deviation]:
+    """Tests that were not frozen, which are exploratory, and those that were and are not made."""
+    frozen = [] if own.requests is None else _tests(last.files.get(own.requests, {}))
+    made = [] if used.requests is None else _tests(read_toml(used.requests))
+    for one in made:
+        if one not in frozen:
+            yield Deviation(kind="analysis", what="a test that was not frozen: exploratory", instead=one)
+    for one in frozen:
+        if one not in made:
+            yield Deviation(kind="analysis", what="a frozen test that was not made (--requests)", frozen=one)
+
+
+def _tests(values: Values) -> Sequence[JsonValue]:
+    found = values.get("requests")
+    return found if isinstance(found, list) else []

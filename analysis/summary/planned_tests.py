@@ -1,0 +1,115 @@
+"""Which tests the report makes of a design, said before there are any data.
+
+It follows from the design alone, as in `designs` and, for the two experiments of the paper, in `summary`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from analysis.summary.designs import MOST_COMPARED, MOST_FACTORS, varied
+from experiments.design.config import DesignConfig
+from experiments.design.language import QuestionConfig
+from experiments.tasks.questions import chance
+
+TestName = Literal["anova", "friedman", "tukey", "exponent", "d_prime", "criterion"]
+
+
+def names_of_tests(design: DesignConfig, question: QuestionConfig) -> tuple[TestName, ...]:
+    """The tests of a question by their names in the statistics; none where its answers are only described."""
+    return (*_comparisons(design, question), *_sensitivity(question)) if question.kind != "text" else ()
+
+
+def _comparisons(design: DesignConfig, question: QuestionConfig) -> Iterator[TestName]:
+    within = _within(design)
+    if _is_described(design, question, within):
+        return
+    if len(within) != 1 or (design.between and question.kind != "ranking"):
+        yield "anova"
+        return
+    levels = design.factors[within[0]].all_levels
+    if question.kind == "number" and all(not isinstance(level, str) and level > 0 for level in levels):
+        yield "exponent"
+    if question.kind != "ranking":
+        yield "anova"
+    if question.kind in {"rating", "ranking"}:
+        yield "friedman"
+    if question.kind != "ranking" and 2 < len(levels) <= MOST_COMPARED:
+        yield "tukey"
+
+
+def _within(design: DesignConfig) -> list[str]:
+    return [name for name in varied(design) if name not in design.between]
+
+
+def _is_described(design: DesignConfig, question: QuestionConfig, within: list[str]) -> bool:
+    """Whether the conditions of a question are described, not tested."""
+    return (
+        design.trial.kind == "pair"
+        or not (within or design.between)
+        or (question.kind == "ranking" and len(within) > 1)
+        or (question.correct is None and len(question.named_answers) > 2)
+        or len(design.between) > 1
+        or len(within) > MOST_FACTORS
+        or any(factor.within is not None for factor in design.factors.values())
+    )
+
+
+def _sensitivity(question: QuestionConfig) -> Iterator[TestName]:
+    if question.correct in {"stimulus", "interval", "larger"}:
+        yield "d_prime"
+    if question.correct == "stimulus":
+        yield "criterion"
+
+
+def sentences_of_tests(design: DesignConfig) -> Iterator[str]:
+    """The tests of a design in sentences, question by question."""
+    if design.design == "direction":
+        yield (
+            "direction: the share of right answers on forward shots is compared between methods by a one-way "
+            "repeated-measures ANOVA, then all pairs by Tukey's HSD with its pooled error term."
+        )
+        yield (
+            "direction: the answers to each method and direction, of all participants together, are tested against "
+            "50 % by exact binomial tests."
+        )
+    elif design.design == "preference":
+        yield (
+            "preference: the ratings are compared between methods by a one-way repeated-measures ANOVA, then all pairs "
+            "by Tukey's HSD with its pooled error term."
+        )
+    else:
+        for name, question in design.questions.items():
+            yield f"{design.design}, {name}: {'; '.join(_sentences(design, question))}."
+
+
+def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
+    factors = " × ".join((*design.between, *_within(design)))
+    several = len(_within(design)) != 1 or bool(design.between)
+    told: dict[TestName, str] = {
+        "anova": f"{'an ANOVA with all interactions' if several else 'a one-way repeated-measures ANOVA'} of {factors}",
+        "friedman": f"Friedman's test of {factors}",
+        "tukey": "Tukey's HSD of all pairs with its pooled error term",
+        "exponent": f"the exponent of the power law over {factors}, tested against 0",
+        "d_prime": "d′ of all answers together and of each condition",
+        "criterion": "and the criterion",
+    }
+    names = names_of_tests(design, question)
+    by_chance = chance(question)
+    yield f"the score is {_score(question)}"
+    yield from (told[name] for name in names)
+    if by_chance is not None:
+        yield f"each condition against chance ({by_chance:g}) by an exact binomial test over all answers"
+    if not names and by_chance is None:
+        yield "it is described, not tested"
+
+
+def _score(question: QuestionConfig) -> str:
+    if question.correct is not None:
+        return "the share of right answers"
+    if question.named_answers:
+        return f"the share of “{question.named_answers[0]}”"
+    return {"number": "the natural logarithm", "rating": "the rating", "ranking": "the rank"}.get(
+        question.kind, "the participants' own words"
+    )

@@ -1,0 +1,405 @@
+"""What a study had set before its first run, word by word and hashed, and what has become of it since.
+
+`recoil freeze` writes `preregistration-1.json` beside `study.toml`: every file of the study as it was read, and the
+words for people. Its hash is over all of it. It is never written again: what changes later is an amendment,
+`preregistration-2.json`, which names the hash of the one before. The journal of every later run names the last.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from pydantic import JsonValue, ValidationError
+
+from device.words import RecoilError
+from experiments.clock import date_text
+from experiments.config.door import ConfigError, Model, StudyConfig, read_toml
+from experiments.config.setup import Setup, sha256
+from experiments.design.config import DesignConfig
+from experiments.record import journal
+from experiments.record.journal import JournalError
+
+STUDY_FILE = "study.toml"
+JOURNALS = "results/sub-*/sub-*_journal.jsonl"
+"""Where the journals of a study lie, below its folder."""
+_NAME = re.compile(r"preregistration-([1-9][0-9]*)\.json")
+_RESTORE = "put the original back, from a copy"
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_SHORT = 12
+"""So many digits of a hash are enough for people."""
+
+Values = Mapping[str, JsonValue]
+Files = Mapping[str, Values]
+"""The files of a study, by their place beside `study.toml`, as plain values."""
+
+
+class PreregistrationError(RecoilError):
+    """A preregistration that cannot be written, or trusted; the message says what to do."""
+
+
+class Change(Model):
+    """A key of a file that differs: what was frozen and what it is now; `None` where there is nothing."""
+
+    file: str
+    key: str
+    frozen: JsonValue
+    now: JsonValue
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.key}: frozen {shown(self.frozen)}, now {shown(self.now)}"
+
+
+class Preregistration(Model):
+    """What was set before the first run, or amended later.
+
+    `begun`: the runs of people that had begun when it was written; `previous`: the hash of the one that it amends,
+    `changes` what differs from that, `reason` why. `files` are the study's, `words` all of it for people.
+    """
+
+    format: Literal[1] = 1
+    number: int
+    written_utc: str
+    provenance: dict[str, str]
+    previous: str | None = None
+    reason: str = ""
+    changes: tuple[Change, ...] = ()
+    begun: tuple[str, ...] = ()
+    files: dict[str, dict[str, JsonValue]]
+    words: str
+
+    @cached_property
+    def sha256(self) -> str:
+        """The hash that every later journal names."""
+        return sha256(self.model_dump(mode="json"))
+
+    @property
+    def short(self) -> str:
+        """The beginning of the hash, which is enough for people."""
+        return self.sha256[:_SHORT]
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return f"preregistration {self.number} of {date_text(self.written_utc)} ({self.short})"
+
+    @property
+    def study(self) -> StudyConfig:
+        """The study as it was frozen."""
+        return StudyConfig.model_validate_json(json.dumps(self.files[STUDY_FILE]))
+
+    def record(self) -> dict[str, JsonValue]:
+        """What its file holds."""
+        return {**self.model_dump(mode="json"), "sha256": self.sha256}
+
+    def page(self) -> str:
+        """Its words as a page of their own, with the hash."""
+        return f"{self.words}\nSHA-256 of this preregistration: `{self.sha256}`\n"
+
+
+def shown(value: JsonValue) -> str:
+    """A value as people read it.
+
+    >>> shown(None), shown("random"), shown([1, True])
+    ('none', '"random"', '[1, true]')
+    """
+    return "none" if value is None else json.dumps(value, ensure_ascii=False)
+
+
+# what a study is now
+
+
+def files_now(source: Path, study: StudyConfig, setups: Sequence[Setup[DesignConfig]]) -> Files:
+    """The files of a study as they are: study, designs and guns with all their defaults, the others as written."""
+    own = study.preregistration
+    named = [one for one in (study.paper, own.rules, own.requests, own.codebook) if one is not None]
+    return {
+        STUDY_FILE: study.model_dump(mode="json"),
+        **{file: values for setup in setups for file, values in _files_of(source.parent, setup).items()},
+        **{name: read_toml(path) for name in named if (path := source.parent / name).exists()},
+    }
+
+
+def _files_of(folder: Path, setup: Setup[DesignConfig]) -> Files:
+    gun = setup.source.parent / setup.config.gun
+    places = [Path(os.path.relpath(path, folder)).as_posix() for path in (setup.source, gun)]
+    return dict(zip(places, map(_values, setup.record().values()), strict=True))
+
+
+def _values(found: object) -> Values:
+    return found if isinstance(found, dict) else {}
+
+
+def changes(frozen: Files, now: Files) -> tuple[Change, ...]:
+    """Every key that differs, in the order of the files; a default that is spelled out is the same."""
+    return tuple(
+        change
+        for file in dict.fromkeys([*frozen, *now])
+        for change in changed_keys(file, frozen.get(file, {}), now.get(file, {}))
+    )
+
+
+def changed_keys(file: str, frozen: Values, now: Values) -> Iterator[Change]:
+    """The keys of one file that differ."""
+    before, after = dict(_leaves(frozen)), dict(_leaves(now))
+    for key in dict.fromkeys([*before, *after]):
+        if before.get(key) != after.get(key) or isinstance(before.get(key), bool) != isinstance(after.get(key), bool):
+            yield Change(file=file, key=key, frozen=before.get(key), now=after.get(key))
+
+
+def _leaves(value: JsonValue | Values, key: str = "") -> Iterator[tuple[str, JsonValue]]:
+    """Dotted keys with what is no table; the tables of a list are numbered from 1."""
+    if isinstance(value, list) and any(isinstance(one, dict) for one in value):
+        value = {str(number): one for number, one in enumerate(value, start=1)}
+    if not isinstance(value, Mapping):
+        yield key, value
+        return
+    for name, inner in value.items():
+        part = name if _BARE.fullmatch(name) else json.dumps(name, ensure_ascii=False)
+        yield from _leaves(inner, f"{key}.{part}" if key else part)
+
+
+def changes_of_run(frozen: Preregistration, setup: object) -> tuple[Change, ...]:
+    """What a run's setup has otherwise than it was frozen; `setup` is the record of it, as in the journal's head."""
+    found = setup if isinstance(setup, Mapping) else {}
+    design, gun = _values(found.get("experiment")), _values(found.get("gun"))
+    file = design_file(frozen, str(design.get("design")))
+    if file is None:
+        names = frozen.files[STUDY_FILE].get("experiments")
+        return (Change(file=STUDY_FILE, key="experiments", frozen=names, now=design.get("design")),)
+    of_gun = gun_file(frozen, file)
+    return (
+        *changed_keys(file, frozen.files[file], design),
+        *changed_keys(of_gun, frozen.files.get(of_gun, {}), gun),
+    )
+
+
+def design_file(frozen: Preregistration, design: str) -> str | None:
+    """The file of the study that holds a design of this name; `None`: none was frozen."""
+    experiments = frozen.study.experiments
+    return next((file for file in experiments if frozen.files.get(file, {}).get("design") == design), None)
+
+
+def gun_file(frozen: Preregistration, file: str) -> str:
+    """The file of the gun that a frozen design names."""
+    return Path(os.path.normpath(Path(file).parent / str(frozen.files[file].get("gun")))).as_posix()
+
+
+# reading what was frozen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chain:
+    """The preregistrations of a folder that can be trusted, in their order, and what is wrong with the others."""
+
+    folder: Path
+    every: tuple[Preregistration, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    @property
+    def last(self) -> Preregistration | None:
+        """The one in force."""
+        return self.every[-1] if self.every else None
+
+    def by_hash(self, wanted: str) -> Preregistration | None:
+        """The one that a journal names."""
+        return next((one for one in self.every if one.sha256 == wanted), None)
+
+
+def json_file(folder: Path, number: int) -> Path:
+    """The file of a preregistration."""
+    return folder / f"preregistration-{number}.json"
+
+
+def page_file(folder: Path, number: int) -> Path:
+    """The page of a preregistration, for people."""
+    return folder / f"preregistration-{number}.md"
+
+
+def numbers_there(folder: Path) -> list[int]:
+    """The numbers of the preregistrations of a folder, edited ones too."""
+    return sorted(int(found[1]) for path in folder.glob("*.json") if (found := _NAME.fullmatch(path.name)))
+
+
+def read_chain(folder: Path) -> Chain:
+    """The preregistrations beside a study; none is no problem."""
+    every, problems = list[Preregistration](), list[str]()
+    for number in range(1, max(numbers_there(folder), default=0) + 1):
+        try:
+            one = _read(json_file(folder, number), number)
+            problems += _broken_links(folder, every, one)
+            every.append(one)
+            problems += _edited_page(page_file(folder, number), one)
+        except PreregistrationError as error:
+            problems.append(str(error))
+    return Chain(folder=folder, every=tuple(every), problems=tuple(problems))
+
+
+def _broken_links(folder: Path, before: Sequence[Preregistration], one: Preregistration) -> Iterator[str]:
+    earlier = before[-1] if before and before[-1].number == one.number - 1 else None
+    if earlier is not None and one.previous != earlier.sha256:
+        yield (
+            f"{json_file(folder, earlier.number)}: is not the preregistration that {json_file(folder, one.number).name}"
+            f" amends ({str(one.previous)[:_SHORT]}, not {earlier.short}); it was replaced: {_RESTORE}"
+        )
+
+
+def _edited_page(path: Path, one: Preregistration) -> Iterator[str]:
+    """A page that is not there says nothing: the words stand in the other file too."""
+    try:
+        there = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return
+    except (OSError, UnicodeDecodeError) as error:
+        there = str(error)
+    if there != one.page():
+        yield (
+            f"{path}: was edited: it is not the page of {json_file(path.parent, one.number).name}; delete it, and "
+            f"`recoil freeze {path.parent}` writes it again"
+        )
+
+
+def _read(path: Path, number: int) -> Preregistration:
+    """One that can be trusted. `PreregistrationError`: it is missing, or was edited."""
+    try:
+        found = json.loads(path.read_bytes(), object_pairs_hook=_once)
+        stated = found.pop("sha256", None)
+        one = Preregistration.model_validate_json(json.dumps(found))
+    except FileNotFoundError as error:
+        raise PreregistrationError(f"{path}: is missing, though a later one amends it; {_RESTORE}") from error
+    except OSError as error:
+        raise PreregistrationError(f"{path}: cannot be read ({error.strerror})") from error
+    except (ValueError, AttributeError, RecursionError) as error:
+        why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
+        raise PreregistrationError(
+            f"{path}: was edited, or is of another version of Recoil ({why}); {_RESTORE}"
+        ) from error
+    if one.sha256 != stated or one.number != number or STUDY_FILE not in one.files:
+        raise PreregistrationError(
+            f"{path}: was edited: its content has the hash {one.short}, and it says {str(stated)[:_SHORT]}; {_RESTORE}."
+            f" A change that is meant goes into the configs; `recoil freeze {path.parent}` then writes an amendment"
+        )
+    return one
+
+
+def _once(pairs: Sequence[tuple[str, JsonValue]]) -> dict[str, JsonValue]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError("a key stands there twice")
+    return found
+
+
+# how a study stands
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """Whether a study is frozen, what has changed since, and what is wrong with what was frozen.
+
+    `missing`: what is not there, or cannot be read, so that something cannot be compared.
+    """
+
+    chain: Chain
+    changes: tuple[Change, ...] = ()
+    missing: tuple[str, ...] = ()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What was edited, or is missing."""
+        return (*self.chain.problems, *self.missing)
+
+    def of_files(self, names: Collection[str]) -> Standing:
+        """The same of some files alone."""
+        return replace(self, changes=tuple(change for change in self.changes if change.file in names))
+
+    def record(self) -> dict[str, object] | None:
+        """The preregistration in force, and what has changed since, as plain values; `None` where there is none."""
+        last = self.chain.last
+        if last is None:
+            return None
+        return {
+            "number": last.number,
+            "sha256": last.sha256,
+            "written_utc": last.written_utc,
+            "changes": [change.model_dump(mode="json") for change in self.changes],
+        }
+
+    def lines(self) -> tuple[str, ...]:
+        """What there is to say: under which preregistration, and every key that has changed since."""
+        last = self.chain.last
+        if last is None:
+            return ()
+        if not self.changes:
+            return (f"Frozen by {last.title}: nothing has changed since",)
+        many = "1 key has" if len(self.changes) == 1 else f"{len(self.changes)} keys have"
+        since = f"{many} changed since; `recoil freeze {self.chain.folder}` writes an amendment"
+        return f"Frozen by {last.title}: {since}", *(f"  {change}" for change in self.changes)
+
+
+def study_folder(results: Path, source: Path) -> Path:
+    """The folder of the study that a run belongs to: that of its results, else that of its config."""
+    beside = Path(os.path.normpath(results / ".."))
+    own = (beside / STUDY_FILE).is_file() or numbers_there(beside)
+    return beside if own else source.parent
+
+
+def standing(folder: Path, now: Callable[[], Files], carried: Iterable[tuple[str, str]] = ()) -> Standing:
+    """How a study stands. `now` reads its files, if something was frozen; `carried`: whose journal names which hash."""
+    chain = read_chain(folder)
+    gone = tuple(missing(chain, carried))
+    if chain.last is None:
+        return Standing(chain=chain, missing=gone)
+    try:
+        return Standing(chain=chain, changes=changes(chain.last.files, now()), missing=gone)
+    except ConfigError as error:
+        return Standing(chain=chain, missing=(*gone, *str(error).splitlines()))
+
+
+def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """A line for each preregistration that journals name, and that is not there. `carried`: code and hash."""
+    whose: dict[str, dict[str, None]] = {}
+    for code, named in carried:
+        if named and chain.by_hash(named) is None:
+            whose.setdefault(named, {})[code] = None
+    for named, codes in whose.items():
+        yield (
+            f"{chain.folder}: there is no preregistration {named[:_SHORT]} that can be trusted, which the journals of "
+            f"{', '.join(codes)} name; put its file preregistration-N.json back there, from a copy"
+        )
+
+
+def carried_by(paths: Iterable[Path]) -> Iterator[tuple[str, str]]:
+    """The code and the hash that each journal names; who names none, or cannot be read, is left out."""
+    for path in paths:
+        try:
+            head = journal.head(path)
+        except JournalError:
+            continue
+        if head is not None and head.preregistration_sha256:
+            yield head.plan.participant_id, head.preregistration_sha256
+
+
+def in_force(folder: Path) -> str:
+    """The hash that the journal of a run names that begins now; empty where nothing was frozen."""
+    last = read_chain(folder).last
+    return "" if last is None else last.sha256
+
+
+def run_warnings(setup: Setup[DesignConfig], results: Path, journals: Iterable[Path]) -> Iterator[str]:
+    """What there is to say before a run of a frozen study: what was edited or is missing, and what has changed."""
+    folder = study_folder(results, setup.source)
+    chain = read_chain(folder)
+    yield from chain.problems
+    yield from missing(chain, carried_by(journals))
+    if chain.last is not None and (found := changes_of_run(chain.last, setup.record())):
+        yield (
+            f"{setup.source}: is not as in {chain.last.title}; the run goes on, and the report will list what differs; "
+            f"`recoil freeze {folder}` writes an amendment"
+        )
+        yield from map(str, found)
