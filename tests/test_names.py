@@ -31,7 +31,8 @@ class Shared:
 EXCEPTIONS = {
     "a command, or a function for notebooks, has the name of what it calls": Shared(
         names=(
-            "analyze audit bench check design grim percept power read_logs rebuild reproduce run simulate study times"
+            "analyze audit bench check design freeze grim percept power read_logs rebuild reproduce run simulate study "
+            "times"
         ),
         among=("recoil/commands/*", "recoil/api.py"),
         others=1,

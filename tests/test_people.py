@@ -11,6 +11,7 @@ import pytest
 from experiments.clock import date_text, time_text
 from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
 from experiments.study.folders import Overview
+from experiments.study.preregistration import Chain, FreezeStatus
 from experiments.study.study import NextParticipant, Participant, RunProgress, RunState
 from tests.people import ORDER, someone
 
@@ -125,8 +126,11 @@ def test_a_stop_is_told_with_its_local_date() -> None:
 # who comes next
 
 
+NEVER_FROZEN = FreezeStatus(chain=Chain(folder=Path()))
+
+
 def seen(*people: Participant, coming: NextParticipant | None = None) -> Overview:
-    return Overview(participants=people, next=coming, orders={}, problems=())
+    return Overview(participants=people, next=coming, orders={}, problems=(), frozen=NEVER_FROZEN)
 
 
 def test_who_comes_next_is_said_and_otherwise_why_nobody_does() -> None:

@@ -23,12 +23,15 @@ from experiments.record.journal import JournalError
 from experiments.record.provenance import provenance
 from experiments.study.folders import PlaceError, StudyFolder, open_study
 from experiments.study.preregistration import (
+    JOURNALS,
     STUDY_FILE,
     Preregistration,
     PreregistrationError,
+    carried_by,
     changes,
     files_now,
     json_file,
+    missing,
     page_file,
     read_chain,
 )
@@ -55,8 +58,8 @@ def freeze(folder: Path, reason: str, clock: Clock) -> Frozen:
     if reason:
         check_reason(reason)
     planned, chain = _planned(study), read_chain(folder)
-    if chain.problems:
-        raise PreregistrationError("\n".join(chain.problems))
+    if problems := [*chain.problems, *missing(chain, carried_by(folder.glob(JOURNALS)))]:
+        raise PreregistrationError("\n".join(problems))
     now = files_now(study.source, study.config, study.setups)
     since = () if chain.last is None else changes(chain.last.files, now)
     if chain.last is not None and not since:

@@ -13,7 +13,7 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import runs_of_groups
-from experiments.study.preregistration import Change, Preregistration, shown
+from experiments.study.preregistration import KeyChange, Preregistration, plain_value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,15 +46,17 @@ def _head(one: Preregistration) -> Iterator[str]:
     yield begun
 
 
-def _changes(found: Sequence[Change]) -> Iterator[str]:
+def _changes(found: Sequence[KeyChange]) -> Iterator[str]:
     if found:
         yield "## What it changes"
-        yield _listed(
-            f"`{one.file}` {one.key}: before {shown(one.frozen)}, from now on {shown(one.now)}" for one in found
-        )
+        yield _listed([f"`{one.file}` {one.key}: before {_both(one)}" for one in found])
 
 
-def _listed(items: Sequence[str] | Iterator[str]) -> str:
+def _both(one: KeyChange) -> str:
+    return f"{plain_value(one.frozen)}, from now on {plain_value(one.now)}"
+
+
+def _listed(items: Sequence[str]) -> str:
     return "\n".join(f"- {item}" for item in items)
 
 
@@ -170,7 +172,7 @@ _KINDS = {
 def _request(one: AnyRequest) -> str:
     """What is requested, with every value that its file gives."""
     given = one.model_dump(mode="json", exclude={"kind", "of"}, exclude_none=True)
-    told = "; ".join(f"{key} {shown(value)}" for key, value in given.items())
+    told = "; ".join(f"{key} {plain_value(value)}" for key, value in given.items())
     return f"{_KINDS[one.kind]}{f' ({told})' if told else ''}"
 
 

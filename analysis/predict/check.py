@@ -16,8 +16,8 @@ from experiments.config.door import ConfigError, EligibilityConfig, at_key, part
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import check_methods, find, load_gun, load_setup, load_study
-from experiments.study.folders import stand_of
-from experiments.study.preregistration import JOURNALS, Standing, carried_by, numbers_there
+from experiments.study.folders import freeze_status
+from experiments.study.preregistration import JOURNALS, FreezeStatus, carried_by, numbers_there
 
 EXAMPLE_SEED = 1
 """Orders are shown for this seed if the config gives none; a run without a seed draws its own."""
@@ -31,7 +31,7 @@ class StudyCheck:
     participants: int
     eligibility: EligibilityConfig
     experiments: tuple[DesignCheck, ...]
-    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
+    frozen: FreezeStatus | None = field(default=None, metadata=AS_FROZEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class GunCheck:
     gun: str
     methods: tuple[str, ...]
     assumed: tuple[str, ...]
-    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
+    frozen: FreezeStatus | None = field(default=None, metadata=AS_FROZEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class PaperCheck:
 
     paper: str
     experiments: dict[str, int]
-    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
+    frozen: FreezeStatus | None = field(default=None, metadata=AS_FROZEN)
 
 
 AnyCheck = DesignCheck | StudyCheck | GunCheck | PaperCheck
@@ -62,7 +62,7 @@ def check(name: str, seed: int | None, participants: int) -> AnyCheck:
     carried = [*carried_by(path.parent.glob(JOURNALS))] if isinstance(found, StudyCheck) else []
     if not carried and not numbers_there(path.parent):
         return found
-    stand = stand_of(path.parent, carried)
+    stand = freeze_status(path.parent, carried)
     return replace(found, frozen=stand if isinstance(found, StudyCheck) else stand.of_files(_files(found, path)))
 
 

@@ -36,7 +36,7 @@ from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
 from experiments.screens.synthetic import synthetic_participant_of
-from experiments.study.preregistration import Standing
+from experiments.study.preregistration import FreezeStatus
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 
@@ -46,7 +46,7 @@ _EXPECTED_EVEN = 5
 """Of fewer participants nobody expects first positions to be even."""
 
 
-AS_FROZEN: Mapping[str, Any] = OPTIONAL | written(Standing.record, "preregistration")
+AS_FROZEN: Mapping[str, Any] = OPTIONAL | written(FreezeStatus.record, "preregistration")
 """Metadata of how a config stands beside its preregistration, which is left out where there is none."""
 
 
@@ -86,7 +86,7 @@ class DesignCheck:
     felt_forward_rates: dict[str, dict[str, float]]
     warnings: tuple[str, ...]
     assumed: tuple[str, ...]
-    frozen: Standing | None = field(default=None, metadata=AS_FROZEN)
+    frozen: FreezeStatus | None = field(default=None, metadata=AS_FROZEN)
 
 
 def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) -> DesignCheck:

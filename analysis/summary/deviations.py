@@ -16,12 +16,12 @@ from experiments.config.door import PreregistrationConfig, read_toml
 from experiments.record import journal
 from experiments.record.journal import Head, JournalError
 from experiments.record.provenance import recoil_version
-from experiments.study.folders import stand_of
+from experiments.study.folders import freeze_status
 from experiments.study.preregistration import (
     Chain,
+    FileValues,
+    FreezeStatus,
     Preregistration,
-    Standing,
-    Values,
     changed_keys,
     changes_of_run,
     read_chain,
@@ -97,7 +97,7 @@ class _Looked:
 
     results: Path
     logs: Logs
-    stand: Standing
+    stand: FreezeStatus
     registered: Register
     heads: tuple[tuple[RunFile, Head], ...]
 
@@ -114,7 +114,7 @@ class _Looked:
         return cls(
             results=results,
             logs=logs,
-            stand=stand_of(results.parent, carried),
+            stand=freeze_status(results.parent, carried),
             registered=read_register(results),
             heads=tuple(sorted(mine, key=lambda one: one[1].utc)),
         )
@@ -177,7 +177,7 @@ def _amended(chain: Chain) -> Iterator[Deviation]:
             yield Deviation(kind="amended", what=what, frozen=change.frozen, instead=change.now)
 
 
-def _changed(stand: Standing) -> Iterator[Deviation]:
+def _changed(stand: FreezeStatus) -> Iterator[Deviation]:
     for change in stand.changes:
         what = f"{change.file}: {change.key}"
         yield Deviation(kind="changed since", what=what, frozen=change.frozen, instead=change.now)
@@ -300,7 +300,7 @@ def _file(last: Preregistration, option: str, name: str | None, path: Path | Non
         if name is not None:
             yield Deviation(kind="analysis", what=f"{option} was not given", frozen=name)
         return
-    frozen: Values = {} if name is None else last.files.get(name, {})
+    frozen: FileValues = {} if name is None else last.files.get(name, {})
     for change in changed_keys(path.name, frozen, read_toml(path)):
         what = f"{option} {path.name}: {change.key}"
         yield Deviation(kind="analysis", what=what, frozen=change.frozen, instead=change.now)
@@ -318,6 +318,6 @@ def _requests(last: Preregistration, own: PreregistrationConfig, used: AnalysisF
             yield Deviation(kind="analysis", what="a frozen test that was not made (--requests)", frozen=one)
 
 
-def _tests(values: Values) -> Sequence[JsonValue]:
+def _tests(values: FileValues) -> Sequence[JsonValue]:
     found = values.get("requests")
     return found if isinstance(found, list) else []

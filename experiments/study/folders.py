@@ -30,11 +30,11 @@ from experiments.study import register
 from experiments.study.balance import group_of_next_run, row_of_next_run
 from experiments.study.preregistration import (
     STUDY_FILE,
-    Standing,
+    FreezeStatus,
     files_now,
     missing,
     read_chain,
-    standing,
+    status_beside,
     study_folder,
 )
 from experiments.study.register import Register
@@ -171,7 +171,7 @@ class Overview:
     next: NextParticipant | None
     orders: dict[str, tuple[str, ...] | None]
     problems: tuple[str, ...]
-    frozen: Standing
+    frozen: FreezeStatus
 
 
 def open_study(folder: Path) -> StudyFolder:
@@ -224,7 +224,7 @@ def look_at(study: StudyFolder, participant_id: str) -> tuple[Participant, tuple
     return look.participant(participant_id), tuple(look.problems)
 
 
-def stand_of(folder: Path, carried: Sequence[tuple[str, str]] = ()) -> Standing:
+def freeze_status(folder: Path, carried: Sequence[tuple[str, str]] = ()) -> FreezeStatus:
     """How the study of a folder stands beside what was frozen; that its files cannot be read is among the problems."""
     try:
         if not (folder / STUDY_FILE).is_file():
@@ -232,8 +232,8 @@ def stand_of(folder: Path, carried: Sequence[tuple[str, str]] = ()) -> Standing:
         study = _loaded(str(folder / STUDY_FILE), folder / "results")
     except ConfigError as error:
         chain = read_chain(folder)
-        return Standing(chain=chain, missing=(*missing(chain, carried), *str(error).splitlines()))
-    return standing(folder, lambda: files_now(study.source, study.config, study.setups), carried)
+        return FreezeStatus(chain=chain, missing=(*missing(chain, carried), *str(error).splitlines()))
+    return status_beside(folder, lambda: files_now(study.source, study.config, study.setups), carried)
 
 
 class _Look:
@@ -308,13 +308,13 @@ class _Look:
             raise seen
         return seen
 
-    def frozen(self) -> Standing:
+    def frozen(self) -> FreezeStatus:
         """Whether the study is frozen, by its files and by the journals that were looked at."""
         study = self._study
         heads = [head for head in self._heads.values() if isinstance(head, Head)]
         carried = [(head.plan.participant_id, head.preregistration_sha256) for head in heads]
         folder = study_folder(study.results, study.source)
-        return standing(folder, lambda: files_now(study.source, study.config, study.setups), carried)
+        return status_beside(folder, lambda: files_now(study.source, study.config, study.setups), carried)
 
     def orders(self, next_one: NextParticipant | None) -> dict[str, tuple[str, ...] | None]:
         """The methods of who is next, by experiment; `None` where chance decides, or rows cannot be read."""

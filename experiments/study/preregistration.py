@@ -12,7 +12,6 @@ import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -29,14 +28,14 @@ from experiments.record.journal import JournalError
 STUDY_FILE = "study.toml"
 JOURNALS = "results/sub-*/sub-*_journal.jsonl"
 """Where the journals of a study lie, below its folder."""
-_NAME = re.compile(r"preregistration-([1-9][0-9]*)\.json")
+_NAME = re.compile(r"preregistration-([1-9][0-9]{0,5})\.(json|md)")
 _RESTORE = "put the original back, from a copy"
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _SHORT = 12
 """So many digits of a hash are enough for people."""
 
-Values = Mapping[str, JsonValue]
-Files = Mapping[str, Values]
+FileValues = Mapping[str, JsonValue]
+Files = Mapping[str, FileValues]
 """The files of a study, by their place beside `study.toml`, as plain values."""
 
 
@@ -44,7 +43,7 @@ class PreregistrationError(RecoilError):
     """A preregistration that cannot be written, or trusted; the message says what to do."""
 
 
-class Change(Model):
+class KeyChange(Model):
     """A key of a file that differs: what was frozen and what it is now; `None` where there is nothing."""
 
     file: str
@@ -53,7 +52,7 @@ class Change(Model):
     now: JsonValue
 
     def __str__(self) -> str:
-        return f"{self.file}: {self.key}: frozen {shown(self.frozen)}, now {shown(self.now)}"
+        return f"{self.file}: {self.key}: frozen {plain_value(self.frozen)}, now {plain_value(self.now)}"
 
 
 class Preregistration(Model):
@@ -69,12 +68,12 @@ class Preregistration(Model):
     provenance: dict[str, str]
     previous: str | None = None
     reason: str = ""
-    changes: tuple[Change, ...] = ()
+    changes: tuple[KeyChange, ...] = ()
     begun: tuple[str, ...] = ()
     files: dict[str, dict[str, JsonValue]]
     words: str
 
-    @cached_property
+    @property
     def sha256(self) -> str:
         """The hash that every later journal names."""
         return sha256(self.model_dump(mode="json"))
@@ -103,10 +102,10 @@ class Preregistration(Model):
         return f"{self.words}\nSHA-256 of this preregistration: `{self.sha256}`\n"
 
 
-def shown(value: JsonValue) -> str:
+def plain_value(value: JsonValue) -> str:
     """A value as people read it.
 
-    >>> shown(None), shown("random"), shown([1, True])
+    >>> plain_value(None), plain_value("random"), plain_value([1, True])
     ('none', '"random"', '[1, true]')
     """
     return "none" if value is None else json.dumps(value, ensure_ascii=False)
@@ -132,11 +131,11 @@ def _files_of(folder: Path, setup: Setup[DesignConfig]) -> Files:
     return dict(zip(places, map(_values, setup.record().values()), strict=True))
 
 
-def _values(found: object) -> Values:
+def _values(found: object) -> FileValues:
     return found if isinstance(found, dict) else {}
 
 
-def changes(frozen: Files, now: Files) -> tuple[Change, ...]:
+def changes(frozen: Files, now: Files) -> tuple[KeyChange, ...]:
     """Every key that differs, in the order of the files; a default that is spelled out is the same."""
     return tuple(
         change
@@ -145,15 +144,15 @@ def changes(frozen: Files, now: Files) -> tuple[Change, ...]:
     )
 
 
-def changed_keys(file: str, frozen: Values, now: Values) -> Iterator[Change]:
+def changed_keys(file: str, frozen: FileValues, now: FileValues) -> Iterator[KeyChange]:
     """The keys of one file that differ."""
     before, after = dict(_leaves(frozen)), dict(_leaves(now))
     for key in dict.fromkeys([*before, *after]):
         if before.get(key) != after.get(key) or isinstance(before.get(key), bool) != isinstance(after.get(key), bool):
-            yield Change(file=file, key=key, frozen=before.get(key), now=after.get(key))
+            yield KeyChange(file=file, key=key, frozen=before.get(key), now=after.get(key))
 
 
-def _leaves(value: JsonValue | Values, key: str = "") -> Iterator[tuple[str, JsonValue]]:
+def _leaves(value: JsonValue | FileValues, key: str = "") -> Iterator[tuple[str, JsonValue]]:
     """Dotted keys with what is no table; the tables of a list are numbered from 1."""
     if isinstance(value, list) and any(isinstance(one, dict) for one in value):
         value = {str(number): one for number, one in enumerate(value, start=1)}
@@ -165,14 +164,14 @@ def _leaves(value: JsonValue | Values, key: str = "") -> Iterator[tuple[str, Jso
         yield from _leaves(inner, f"{key}.{part}" if key else part)
 
 
-def changes_of_run(frozen: Preregistration, setup: object) -> tuple[Change, ...]:
+def changes_of_run(frozen: Preregistration, setup: object) -> tuple[KeyChange, ...]:
     """What a run's setup has otherwise than it was frozen; `setup` is the record of it, as in the journal's head."""
     found = setup if isinstance(setup, Mapping) else {}
     design, gun = _values(found.get("experiment")), _values(found.get("gun"))
     file = design_file(frozen, str(design.get("design")))
     if file is None:
         names = frozen.files[STUDY_FILE].get("experiments")
-        return (Change(file=STUDY_FILE, key="experiments", frozen=names, now=design.get("design")),)
+        return (KeyChange(file=STUDY_FILE, key="experiments", frozen=names, now=design.get("design")),)
     of_gun = gun_file(frozen, file)
     return (
         *changed_keys(file, frozen.files[file], design),
@@ -223,14 +222,15 @@ def page_file(folder: Path, number: int) -> Path:
 
 
 def numbers_there(folder: Path) -> list[int]:
-    """The numbers of the preregistrations of a folder, edited ones too."""
-    return sorted(int(found[1]) for path in folder.glob("*.json") if (found := _NAME.fullmatch(path.name)))
+    """The numbers of the preregistrations of a folder, also of those that were edited, or have a page alone."""
+    names = (_NAME.fullmatch(path.name) for path in folder.glob("preregistration-*"))
+    return sorted({int(found[1]) for found in names if found})
 
 
 def read_chain(folder: Path) -> Chain:
     """The preregistrations beside a study; none is no problem."""
-    every, problems = list[Preregistration](), list[str]()
-    for number in range(1, max(numbers_there(folder), default=0) + 1):
+    every, problems, there = list[Preregistration](), list[str](), numbers_there(folder)
+    for number in sorted({*there, *(number - 1 for number in there if number > 1)}):
         try:
             one = _read(json_file(folder, number), number)
             problems += _broken_links(folder, every, one)
@@ -272,7 +272,7 @@ def _read(path: Path, number: int) -> Preregistration:
         stated = found.pop("sha256", None)
         one = Preregistration.model_validate_json(json.dumps(found))
     except FileNotFoundError as error:
-        raise PreregistrationError(f"{path}: is missing, though a later one amends it; {_RESTORE}") from error
+        raise PreregistrationError(f"{path}: is missing, though its page or a later one is not; {_RESTORE}") from error
     except OSError as error:
         raise PreregistrationError(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, AttributeError, RecursionError) as error:
@@ -299,14 +299,14 @@ def _once(pairs: Sequence[tuple[str, JsonValue]]) -> dict[str, JsonValue]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class FreezeStatus:
     """Whether a study is frozen, what has changed since, and what is wrong with what was frozen.
 
     `missing`: what is not there, or cannot be read, so that something cannot be compared.
     """
 
     chain: Chain
-    changes: tuple[Change, ...] = ()
+    changes: tuple[KeyChange, ...] = ()
     missing: tuple[str, ...] = ()
 
     @property
@@ -314,7 +314,7 @@ class Standing:
         """What was edited, or is missing."""
         return (*self.chain.problems, *self.missing)
 
-    def of_files(self, names: Collection[str]) -> Standing:
+    def of_files(self, names: Collection[str]) -> FreezeStatus:
         """The same of some files alone."""
         return replace(self, changes=tuple(change for change in self.changes if change.file in names))
 
@@ -349,16 +349,16 @@ def study_folder(results: Path, source: Path) -> Path:
     return beside if own else source.parent
 
 
-def standing(folder: Path, now: Callable[[], Files], carried: Iterable[tuple[str, str]] = ()) -> Standing:
+def status_beside(folder: Path, now: Callable[[], Files], carried: Iterable[tuple[str, str]] = ()) -> FreezeStatus:
     """How a study stands. `now` reads its files, if something was frozen; `carried`: whose journal names which hash."""
     chain = read_chain(folder)
     gone = tuple(missing(chain, carried))
     if chain.last is None:
-        return Standing(chain=chain, missing=gone)
+        return FreezeStatus(chain=chain, missing=gone)
     try:
-        return Standing(chain=chain, changes=changes(chain.last.files, now()), missing=gone)
+        return FreezeStatus(chain=chain, changes=changes(chain.last.files, now()), missing=gone)
     except ConfigError as error:
-        return Standing(chain=chain, missing=(*gone, *str(error).splitlines()))
+        return FreezeStatus(chain=chain, missing=(*gone, *str(error).splitlines()))
 
 
 def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[str]:

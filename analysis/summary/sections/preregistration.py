@@ -9,7 +9,7 @@ from analysis.report.section import Section, Table
 from analysis.summary.deviations import Deviation, StudyDeviations
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.participants import how_many
-from experiments.study.preregistration import shown
+from experiments.study.preregistration import plain_value
 
 
 def deviations_sections(report: ReportData) -> Iterator[Section]:
@@ -49,4 +49,4 @@ def _values(one: Deviation) -> tuple[str, str]:
     """Both values; where what is said has none, neither."""
     if one.frozen is None and one.instead is None:
         return apa.NO_NUMBER, apa.NO_NUMBER
-    return shown(one.frozen), shown(one.instead)
+    return plain_value(one.frozen), plain_value(one.instead)

@@ -45,6 +45,15 @@ def coming_text(seen: Overview) -> str:
     return "Everyone has done everything." if done else "Nobody can be named next: see what cannot be read."
 
 
+def changed_text(seen: Overview) -> str:
+    """That the study is not as it was frozen; what was edited or is missing is among its problems."""
+    last, changed = seen.frozen.chain.last, len(seen.frozen.changes)
+    if last is None or not changed:
+        return ""
+    keys = "1 key has" if changed == 1 else f"{changed} keys have"
+    return f"{keys} changed since {last.title}; `recoil study` names them, and the report will."
+
+
 def named_text(named: str, code: str, person: Participant | None, experiment: str) -> str:
     """Why another experiment is chosen than the one that was named when the program was started."""
     if not code or named in ("", experiment):

@@ -110,7 +110,8 @@ class StartWindow(QtWidgets.QWidget):
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
         code, experiment = entered.participant_id, entered.experiment
         named = people.named_text(opening.named, code, self._person(code), experiment)
-        self.say("\n".join([*bad, *filter(None, [named])]), "bad" if bad else "ask")
+        told = filter(None, [named, people.changed_text(self._seen)])
+        self.say("\n".join([*bad, *told]), "bad" if bad else "ask")
 
     def _propose(self, participant_id: str) -> None:
         """Who was there before if they have something left to do, else who comes next."""

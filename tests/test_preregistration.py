@@ -1,0 +1,431 @@
+"""A study that is frozen: every key that differs is named with both values, an edited file is named, runs carry it."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
+
+import pytest
+
+from analysis.archive.preregistration import Frozen, freeze
+from analysis.logs.reading import read_logs
+from analysis.predict.check import check, check_text
+from analysis.summary.designs import summarise
+from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
+from analysis.summary.planned_tests import names_of_tests
+from analysis.summary.results import StudyStatistics
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.preregistration import deviations_sections
+from experiments.clock import RealClock, VirtualClock
+from experiments.config.door import ConfigError
+from experiments.load import load_setup
+from experiments.record.journal import head
+from experiments.run import RunRequest, run
+from experiments.screens.console.people import changed_text
+from experiments.screens.synthetic import synthetic_screen
+from experiments.study import register
+from experiments.study.folders import PlaceError, freeze_status, open_study, overview
+from experiments.study.preregistration import PreregistrationError, plain_value, run_warnings
+from experiments.study.study import Facts
+from recoil.config_files import new_study
+from tests.tables_of_designs import loaded, simulated
+
+KEYS: dict[str, tuple[tuple[str, str, object, object], ...]] = {
+    "study.toml": (
+        ("participants", "14", 14, 16),
+        ("code_prefix", '"P"', "P", "Q"),
+        ("replications", "2000", 2000, 100),
+        ("eligibility.age_years_min", "21", 21, 18),
+        ("eligibility.age_years_max", "29", 29, 35),
+    ),
+    "direction.toml": (
+        ("order.sets", "4", 4, 2),
+        ("order.sessions", '"random"', "random", "williams"),
+        ("order.balance", '"session"', "session", "set"),
+        ("questions.response.text", '"Which way did the gun shoot?"', "Which way did the gun shoot?", "Which way?"),
+        ("practice.repetitions", "1", 1, 2),
+        ("breaks.between_sets_s", "20.0", 20.0, 30.0),
+        ("breaks.between_sessions_s", "300.0", 300.0, 240.0),
+        ("fatigue.max_trials_without_break", "10", 10, 20),
+        ("fatigue.max_planned_s", "2700.0", 2700.0, 3600.0),
+        ("timing.hand_over_s", "15.8", 15.8, 14.0),
+        ("timing.answer_s", "1.2", 1.2, 1.5),
+        ("timing.planned_s", "1800.0", 1800.0, 1700.0),
+        ("console.guard_s", "0.25", 0.25, 0.5),
+        ("console.response_times", "false", False, True),
+    ),
+    "gun.toml": (
+        ("voice_coil.magnet_mass_kg", "0.114", 0.114, 0.12),
+        ("voice_coil.resistance_ohm", "2.9", 2.9, 3.0),
+        ("voice_coil.stiffness_N_m", "14.0", 14.0, 13.0),
+        ("voice_coil.friction_N", "0.21", 0.21, 0.22),
+        ("voice_coil.voltage_V", "16.0", 16.0, 15.0),
+        ("voice_coil.pulse_s", "0.010", 0.010, 0.011),
+        ("voice_coil.emf", '"printed"', "printed", "reciprocal"),
+        ("voice_coil.drive_off", '"shorted"', "shorted", "open"),
+    ),
+    "rules.toml": (
+        ("trials.response_time_min_s", "0.15", 0.15, 0.2),
+        ("trials.drop_unanswered", "true", True, False),
+        ("participants.min_kept_share", "0.8", 0.8, 0.9),
+    ),
+}
+"""Thirty keys: file, key, how its value is written there, what it is and what it becomes."""
+RULES = "[trials]\nresponse_time_min_s = 0.15\ndrop_unanswered = true\n[participants]\nmin_kept_share = 0.8\n"
+REQUEST = '[[requests]]\nkind = "bayes-factor"\nof = "direction"\nscale = 0.5\n'
+
+
+def made(folder: Path) -> Path:
+    """A new study with rules, a further test, a hypothesis and a stop rule of its own."""
+    new_study(folder)
+    (folder / "rules.toml").write_text(RULES)
+    (folder / "requests.toml").write_text(REQUEST)
+    with (folder / "study.toml").open("a") as file:
+        file.write('\n[preregistration]\nhypotheses = ["More force is felt better."]\nstop_rule = "After the term."\n')
+        file.write('rules = "rules.toml"\nrequests = "requests.toml"\n')
+    return folder
+
+
+def edited(folder: Path, file: str, key: str, old: str, new: object) -> None:
+    """A value of a file as its owner changes it: on the first line with that name and value."""
+    path = folder / file
+    text, name = path.read_text(), key.rpartition(".")[2]
+    changed, count = re.subn(
+        rf"^(# )?{name} += {re.escape(old)}(?![\w.])",
+        f"{name} = {plain_value(new)}",
+        text,
+        count=1,
+        flags=re.MULTILINE,
+    )
+    assert count, f"{file} has no {name} = {old} any more"
+    path.write_text(changed)
+
+
+def do(folder: Path, code: str, *, person: bool = True) -> Path:
+    """A run as a person does it, typed by the screen of a synthetic participant; its journal."""
+    setup, results = load_setup(folder / "preference.toml"), folder / "results"
+    request = RunRequest(
+        setup=setup, participant_id=code, results=results, seed=1, screen="terminal" if person else "synthetic"
+    )
+    return run(request, synthetic_screen, VirtualClock()).place.journal
+
+
+def told(folder: Path, **used: object) -> StudyDeviations:
+    """The deviations of a study whose analysis used its own rules and tests, unless it says otherwise."""
+    files = AnalysisFiles(rules=folder / "rules.toml", requests=folder / "requests.toml")
+    found, _ = deviations(read_logs([folder / "results"]), replace(files, **used))
+    assert len(found) == 1
+    return found[0]
+
+
+def of_kind(found: StudyDeviations, kind: str) -> list[Deviation]:
+    return [one for one in found.deviations if one.kind == kind]
+
+
+def report(found: StudyDeviations) -> str:
+    section = next(deviations_sections(ReportData(title="", statistics=StudyStatistics(preregistration=(found,)))))
+    return "\n".join([*section.paragraphs, *(" | ".join(row) for table in section.tables for row in table.rows)])
+
+
+@pytest.fixture(scope="module")
+def templates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A new study, the same when it is frozen, and with a run of a person after that."""
+    folder = tmp_path_factory.mktemp("templates")
+    made(folder / "new")
+    copytree(folder / "new", folder / "frozen")
+    freeze(folder / "frozen", "", RealClock())
+    copytree(folder / "frozen", folder / "begun")
+    do(folder / "begun", "P01")
+    return folder
+
+
+@pytest.fixture
+def study(templates: Path, tmp_path: Path) -> Path:
+    """A study that nobody has frozen yet."""
+    return copytree(templates / "new", tmp_path / "pilot")
+
+
+@pytest.fixture
+def frozen(templates: Path, tmp_path: Path) -> Path:
+    return copytree(templates / "frozen", tmp_path / "pilot")
+
+
+@pytest.fixture
+def begun(templates: Path, tmp_path: Path) -> Path:
+    """A frozen study with the run of a person."""
+    return copytree(templates / "begun", tmp_path / "pilot")
+
+
+# what is written
+
+
+def test_the_page_says_in_words_what_was_planned(study: Path) -> None:
+    done = freeze(study, "", RealClock())
+    page = done.page.read_text()
+    for words in (
+        "More force is felt better.",
+        "After the term.",
+        "14 participants do",
+        "at least 21 years and at most 29 years",
+        "20 trials in 4 sets of 5",
+        "Trials whose response time is below 0.15 s are dropped.",
+        "one-way repeated-measures ANOVA",
+        "direction, the Bayes factor of the repeated-measures ANOVA (scale 0.5)",
+        "No run of a person had begun.",
+        done.preregistration.sha256,
+    ):
+        assert words in page
+
+
+def test_a_second_freeze_writes_an_amendment_where_something_has_changed_and_else_nothing(
+    begun: Path,
+) -> None:
+    first = (begun / "preregistration-1.json").read_bytes()
+    again = freeze(begun, "", RealClock())
+    assert (again.is_new, again.preregistration.number) == (False, 1)
+    edited(begun, "study.toml", "participants", "14", 16)
+    second = freeze(begun, "a grant", RealClock())
+    assert second.preregistration.previous == again.preregistration.sha256
+    assert [str(one) for one in second.preregistration.changes] == ["study.toml: participants: frozen 14, now 16"]
+    assert "a grant" in second.page.read_text()
+    assert (begun / "preregistration-1.json").read_bytes() == first
+    assert [(one.frozen, one.instead) for one in of_kind(told(begun), "amended")] == [(14, 16)]
+
+
+def test_what_cannot_be_frozen_is_refused_with_its_place(study: Path, tmp_path: Path) -> None:
+    with pytest.raises(PlaceError, match="no study's folder"):
+        freeze(tmp_path, "", RealClock())
+    (study / "requests.toml").write_text(REQUEST.replace("direction", "directions"))
+    with pytest.raises(ConfigError, match="of = 'directions': no experiment of this study"):
+        freeze(study, "", RealClock())
+    (study / "requests.toml").unlink()
+    with pytest.raises(ConfigError, match=r"study.toml:\d+: preregistration.requests = 'requests.toml': no such file"):
+        freeze(study, "", RealClock())
+    assert not [*study.glob("preregistration-*")]
+
+
+@pytest.mark.parametrize(
+    "name", ["detection", "grip", "hurry", "magnitude", "pairs", "preference", "realism", "stronger", "voltages"]
+)
+def test_the_tests_that_are_announced_are_those_that_are_made(name: str) -> None:
+    design, laws = loaded(name)
+    found = summarise(design, simulated(design, laws, 4)).questions
+    assert {asked: {one.name for one in summary.tests} for asked, summary in found.items()} == {
+        asked: set(names_of_tests(design, question))
+        for asked, question in design.questions.items()
+        if question.kind != "text"
+    }
+
+
+# what differs
+
+
+def test_thirty_changed_keys_are_each_named_with_both_values(begun: Path) -> None:
+    cases = [(file, *one) for file, keys in KEYS.items() for one in keys]
+    assert len(cases) == 30
+    for file, key, old, _, new in cases:
+        edited(begun, file, key, old, new)
+    found = told(begun)
+    rows = report(found).splitlines()
+    for file, key, _, before, after in cases:
+        assert f"changed since | {file}: {key} | {plain_value(before)} | {plain_value(after)} | " in rows
+    assert len(of_kind(found, "changed since")) == 30
+    said = check_text(check(str(begun / "study.toml"), None, 14))
+    assert said.count(": frozen ") == 30
+    assert all(f"{file}: {key}: frozen {plain_value(one)}" in said for file, key, _, one, _ in cases)
+    assert len(overview(open_study(begun)).frozen.changes) == 30
+
+
+def test_every_single_key_is_found_alone(frozen: Path) -> None:
+    for file, keys in KEYS.items():
+        whole = (frozen / file).read_bytes()
+        for key, old, before, after in keys[:2]:
+            edited(frozen, file, key, old, after)
+            (only,) = freeze_status(frozen).changes
+            assert (only.file, only.key, only.frozen, only.now) == (file, key, before, after)
+            (frozen / file).write_bytes(whole)
+    assert freeze_status(frozen).changes == ()
+
+
+def test_a_comment_and_a_default_that_is_spelled_out_change_nothing(frozen: Path) -> None:
+    with (frozen / "direction.toml").open("a") as file:
+        file.write("# nothing\n")
+    text = (frozen / "study.toml").read_text()
+    (frozen / "study.toml").write_text(text.replace("[preregistration]", "[preregistration]\nfits = false", 1))
+    assert "nothing has changed" in freeze_status(frozen).lines()[0]
+
+
+def test_a_run_names_what_was_frozen_and_warns_of_what_has_changed(frozen: Path) -> None:
+    sha256 = freeze_status(frozen).chain.every[0].sha256
+    kept = [do(frozen, "P01"), do(frozen, "S01", person=False)]
+    assert [one.preregistration_sha256 for path in kept if (one := head(path)) is not None] == [sha256, sha256]
+    edited(frozen, "gun.toml", "voice_coil.voltage_V", "16.0", 15.0)
+    said = [*run_warnings(load_setup(frozen / "preference.toml"), frozen / "results", [])]
+    assert "the run goes on" in said[0]
+    assert said[1:] == ["gun.toml: voice_coil.voltage_V: frozen 16.0, now 15.0"]
+    assert "1 key has changed since preregistration 1" in changed_text(overview(open_study(frozen)))
+    do(frozen, "P02")
+    differing = of_kind(told(frozen), "run")
+    assert [(one.what, one.frozen, one.instead, one.who) for one in differing] == [
+        ("run of preference, gun.toml: voice_coil.voltage_V", 16.0, 15.0, ("P02",))
+    ]
+
+
+def test_runs_before_the_freeze_and_the_people_are_told(study: Path) -> None:
+    do(study, "P01")
+    done = freeze(study, "", RealClock())
+    assert done.preregistration.begun == ("P01 preference",)
+    do(study, "P02")
+    results, clock = study / "results", RealClock()
+    old = Facts(age_years=40, sex="female", handedness="right")
+    register.append(results, register.entry("joined", "P02", facts=old), clock)
+    register.append(results, register.entry("excluded", "P01", reason="fell ill"), clock)
+    found = told(study)
+    assert [one.who for one in of_kind(found, "run")] == [("P01",)]
+    assert "begun before the freeze" in of_kind(found, "run")[0].what
+    assert {(one.what, one.frozen, one.instead) for one in of_kind(found, "participants")} == {
+        ("participants who finished direction", 14, 0),
+        ("participants who finished preference", 14, 1),
+        ("took part, not eligible: age_years = 40: must be at most 29", None, None),
+    }
+    assert [(one.what, one.who) for one in of_kind(found, "exclusion")] == [("excluded by hand: fell ill", ("P01",))]
+
+
+def test_who_came_beyond_the_planned_number_is_named_and_all_as_planned_is_no_deviation(study: Path) -> None:
+    edited(study, "study.toml", "participants", "14", 1)
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(text.replace('["direction.toml", "preference.toml"]', '["preference.toml"]'))
+    (study / "requests.toml").write_text(REQUEST.replace("direction", "preference"))
+    freeze(study, "", RealClock())
+    do(study, "P01")
+    assert "No deviation." in report(told(study))
+    do(study, "P02")
+    (beyond,) = told(study).deviations
+    assert (beyond.frozen, beyond.instead, beyond.who) == (1, 2, ("P02",))
+
+
+TEST = {"kind": "bayes-factor", "of": "direction", "scale": 0.5}
+
+
+def test_other_rules_and_tests_than_were_frozen_are_told(begun: Path, tmp_path: Path) -> None:
+    assert of_kind(told(begun), "analysis") == []
+    rules, tests = tmp_path / "other.toml", tmp_path / "more.toml"
+    rules.write_text(RULES.replace("0.15", "0.3"))
+    tests.write_text(REQUEST.replace("0.5", "0.7"))
+    other = of_kind(told(begun, rules=rules, requests=tests, fits=True), "analysis")
+    assert [(one.what, one.frozen, one.instead) for one in other] == [
+        ("--rules other.toml: trials.response_time_min_s", 0.15, 0.3),
+        ("a test that was not frozen: exploratory", None, TEST | {"scale": 0.7}),
+        (
+            "a frozen test that was not made (--requests)",
+            {"kind": "bayes-factor", "of": "direction", "scale": 0.5},
+            None,
+        ),
+        ("--fits: the diffusion model", False, True),
+    ]
+    none = of_kind(told(begun, rules=None, requests=None), "analysis")
+    assert [one.what for one in none] == ["--rules was not given", "a frozen test that was not made (--requests)"]
+
+
+# what was edited, or is missing
+
+
+def forged(path: Path, how: str) -> None:
+    """An edit of a preregistration."""
+    text = path.read_text()
+    record = json.loads(text)
+    match how:
+        case "value":
+            record["files"]["study.toml"]["participants"] = 16
+        case "words":
+            record["words"] = record["words"].replace("14 participants", "16 participants")
+        case "hash":
+            record["sha256"] = "0" * 64
+        case "time":
+            record["written_utc"] = "2020-01-01T00:00:00Z"
+        case "stranger":
+            record["note"] = "mine"
+        case "cut":
+            path.write_text(text[:-20])
+            return
+        case "twice":
+            path.write_text(text.replace('"number": 1', '"number": 2, "number": 1', 1))
+            return
+    path.write_text(json.dumps(record))
+
+
+@pytest.mark.parametrize("how", ["value", "words", "hash", "time", "stranger", "cut", "twice"])
+def test_an_edited_freeze_is_named_with_what_to_do(frozen: Path, how: str) -> None:
+    path = frozen / "preregistration-1.json"
+    forged(path, how)
+    (said,) = freeze_status(frozen).problems
+    assert said.startswith(f"{path}: was edited")
+    assert "put the original back, from a copy" in said
+
+
+def test_an_edited_freeze_is_named_wherever_the_study_is_looked_at(begun: Path) -> None:
+    path = begun / "preregistration-1.json"
+    forged(path, "value")
+    setup, named = load_setup(begun / "preference.toml"), f"{path}: was edited"
+    assert next(run_warnings(setup, begun / "results", [])).startswith(named)
+    assert any(one.startswith(named) for one in overview(open_study(begun)).problems)
+    assert named in check_text(check(str(begun / "direction.toml"), None, 14))
+    with pytest.raises(PreregistrationError, match="was edited"):
+        freeze(begun, "", RealClock())
+    found, said = deviations(read_logs([begun / "results"]), AnalysisFiles())
+    assert any(one.startswith(named) for one in said)
+    assert of_kind(found[0], "preregistration")[0].what.startswith("preregistration-1.json: was edited")
+    assert str(begun) not in report(found[0])
+
+
+def test_a_freeze_that_is_laid_out_anew_is_not_edited(frozen: Path) -> None:
+    path = frozen / "preregistration-1.json"
+    path.write_text(json.dumps(json.loads(path.read_text())))
+    assert freeze_status(frozen).problems == ()
+
+
+def test_an_edited_page_is_named_and_a_missing_one_written_again(frozen: Path) -> None:
+    page = frozen / "preregistration-1.md"
+    whole = page.read_text()
+    page.write_text(whole.replace("14 participants", "16 participants"))
+    assert "was edited: it is not the page of preregistration-1.json" in freeze_status(frozen).problems[0]
+    page.unlink()
+    freeze(frozen, "", RealClock())
+    assert page.read_text() == whole
+
+
+def test_a_forger_who_makes_a_new_hash_is_found_by_the_journals_and_by_the_amendment(begun: Path) -> None:
+    edited(begun, "study.toml", "participants", "14", 16)
+    second = freeze(begun, "", RealClock()).preregistration
+    first = freeze_status(begun).chain.every[0]
+    other = first.model_copy(update={"written_utc": "2020-01-01T00:00:00Z"})
+    (begun / "preregistration-1.json").write_text(json.dumps(dict(other.record())))
+    (begun / "preregistration-1.md").write_text(other.page())
+    problems = overview(open_study(begun)).problems
+    assert second.previous == first.sha256
+    assert any("is not the preregistration that preregistration-2.json amends" in one for one in problems)
+    assert any(f"no preregistration {first.short} that can be trusted" in one and "P01" in one for one in problems)
+
+
+def test_a_freeze_that_is_gone_is_named_and_not_written_anew(begun: Path) -> None:
+    for path in begun.glob("preregistration-*"):
+        path.unlink()
+    setup, results = load_setup(begun / "preference.toml"), begun / "results"
+    assert "the journals of P01 name" in next(run_warnings(setup, results, results.glob("*/*_journal.jsonl")))
+    assert any("the journals of P01 name" in one for one in overview(open_study(begun)).problems)
+    with pytest.raises(PreregistrationError, match="the journals of P01 name"):
+        freeze(begun, "", RealClock())
+    found, said = deviations(read_logs([results]), AnalysisFiles())
+    assert any("the journals of P01 name" in one for one in said)
+    assert "No preregistration can be trusted" in report(found[0])
+
+
+def test_a_study_that_nobody_froze_hears_nothing_of_it(study: Path) -> None:
+    kept = do(study, "P01")
+    assert b"preregistration_sha256" not in kept.read_bytes()
+    assert deviations(read_logs([study / "results"]), AnalysisFiles()) == ((), ())
+    assert freeze_status(study).lines() == ()
+    assert isinstance(freeze(study, "", RealClock()), Frozen)
