@@ -192,7 +192,10 @@ def test_a_second_freeze_writes_an_amendment_where_something_has_changed_and_els
     assert [str(one) for one in second.preregistration.changes] == ["study.toml: participants: frozen 14, now 16"]
     assert "a grant" in second.page.read_text()
     assert (begun / "preregistration-1.json").read_bytes() == first
-    assert [(one.frozen, one.instead) for one in of_kind(told(begun), "amended")] == [(14, 16)]
+    found = told(begun)
+    assert [(one.frozen, one.instead) for one in of_kind(found, "amended")] == [(14, 16)]
+    assert "when 1 run of people had begun: preregistration 2" in report(found)
+    assert "Reason: a grant." in report(found)
 
 
 def test_what_cannot_be_frozen_is_refused_with_its_place(study: Path, tmp_path: Path) -> None:
@@ -420,7 +423,7 @@ def test_a_freeze_that_is_gone_is_named_and_not_written_anew(begun: Path) -> Non
         freeze(begun, "", RealClock())
     found, said = deviations(read_logs([results]), AnalysisFiles())
     assert any("the journals of P01 name" in one for one in said)
-    assert "No preregistration can be trusted" in report(found[0])
+    assert "no preregistration that can be trusted" in report(found[0])
 
 
 def test_a_study_that_nobody_froze_hears_nothing_of_it(study: Path) -> None:

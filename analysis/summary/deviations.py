@@ -18,6 +18,7 @@ from experiments.record.journal import Head, JournalError
 from experiments.record.provenance import recoil_version
 from experiments.study.folders import freeze_status
 from experiments.study.preregistration import (
+    SHORT,
     Chain,
     FileValues,
     FreezeStatus,
@@ -50,11 +51,13 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrozenAs:
-    """A preregistration of a study, by its hash."""
+    """A preregistration of a study, by its hash: why it amends an earlier one, after how many runs of people."""
 
     number: int
     sha256: str
     written_utc: str
+    reason: str
+    begun: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,12 +153,19 @@ def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
     last = looked.chain.last
     listed = [*_problems(looked)]
     if last is not None:
-        listed += [*_amended(looked.chain), *_changed(looked.stand), *_runs(looked, last)]
+        listed += [*_amended(looked.chain), *_changed(looked.stand), *_runs(looked)]
         listed += [*_participants(looked, last), *_exclusions(looked), *_analysis(last, used)]
     return StudyDeviations(
         study=looked.logs.names.get(str(looked.results), looked.results.parent.name),
         preregistrations=tuple(
-            FrozenAs(number=one.number, sha256=one.sha256, written_utc=one.written_utc) for one in looked.chain.every
+            FrozenAs(
+                number=one.number,
+                sha256=one.sha256,
+                written_utc=one.written_utc,
+                reason=one.reason,
+                begun=len(one.begun),
+            )
+            for one in looked.chain.every
         ),
         deviations=tuple(listed),
     )
@@ -170,10 +180,8 @@ def _problems(looked: _Looked) -> Iterator[Deviation]:
 
 def _amended(chain: Chain) -> Iterator[Deviation]:
     for one in chain.every[1:]:
-        when = f"preregistration {one.number} of {one.written_utc}, {len(one.begun)} runs begun by then"
-        why = f": {one.reason}" if one.reason else ""
         for change in one.changes:
-            what = f"{change.file}: {change.key} ({when}{why})"
+            what = f"{change.file}: {change.key}, by preregistration {one.number}"
             yield Deviation(kind="amended", what=what, frozen=change.frozen, instead=change.now)
 
 
@@ -186,27 +194,33 @@ def _changed(stand: FreezeStatus) -> Iterator[Deviation]:
 # the runs
 
 
-def _runs(looked: _Looked, last: Preregistration) -> Iterator[Deviation]:
+def _runs(looked: _Looked) -> Iterator[Deviation]:
     """What runs did otherwise: each difference once, with everybody of whom it holds."""
     found: dict[str, Deviation] = {}
     for run, head in looked.heads:
         if run.kind != "practice":
-            for one in _of_run(looked.chain, last, head):
+            for one in _of_run(looked.chain, head):
                 key = repr(one)
                 who = (*found[key].who, head.plan.participant_id) if key in found else (head.plan.participant_id,)
                 found[key] = replace(one, who=tuple(dict.fromkeys(who)))
     yield from found.values()
 
 
-def _of_run(chain: Chain, last: Preregistration, head: Head) -> Iterator[Deviation]:
+def _of_run(chain: Chain, head: Head) -> Iterator[Deviation]:
     own = chain.by_hash(head.preregistration_sha256)
     name = head.plan.experiment
     yield from _named_otherwise(chain, own, head)
-    frozen = own or last
+    frozen = own or _in_force_at(chain, head.utc)
     for change in changes_of_run(frozen, head.setup_json):
         what = f"run of {name}, {change.file}: {change.key}"
         yield Deviation(kind="run", what=what, frozen=change.frozen, instead=change.now)
     yield from _version(f"Recoil in a run of {name}", frozen, head.provenance.get("recoil", "unknown"))
+
+
+def _in_force_at(chain: Chain, utc: str) -> Preregistration:
+    """What was frozen last at a time; before anything was, what was frozen first."""
+    earlier = [one for one in chain.every if one.written_utc <= utc]
+    return earlier[-1] if earlier else chain.every[0]
 
 
 def _named_otherwise(chain: Chain, own: Preregistration | None, head: Head) -> Iterator[Deviation]:
@@ -218,8 +232,8 @@ def _named_otherwise(chain: Chain, own: Preregistration | None, head: Head) -> I
         yield Deviation(
             kind="run",
             what=f"{what} under {'another preregistration' if named else 'no preregistration'}",
-            frozen=first.sha256,
-            instead=named or None,
+            frozen=_in_force_at(chain, head.utc).short,
+            instead=named[:SHORT] or None,
         )
     elif later := [one for one in chain.every if one.number > own.number and one.written_utc < head.utc]:
         what = f"{what} under an earlier preregistration than was in force"

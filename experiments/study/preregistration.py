@@ -31,7 +31,7 @@ JOURNALS = "results/sub-*/sub-*_journal.jsonl"
 _NAME = re.compile(r"preregistration-([1-9][0-9]{0,5})\.(json|md)")
 _RESTORE = "put the original back, from a copy"
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_SHORT = 12
+SHORT = 12
 """So many digits of a hash are enough for people."""
 
 FileValues = Mapping[str, JsonValue]
@@ -81,7 +81,7 @@ class Preregistration(Model):
     @property
     def short(self) -> str:
         """The beginning of the hash, which is enough for people."""
-        return self.sha256[:_SHORT]
+        return self.sha256[:SHORT]
 
     @property
     def title(self) -> str:
@@ -246,7 +246,7 @@ def _broken_links(folder: Path, before: Sequence[Preregistration], one: Preregis
     if earlier is not None and one.previous != earlier.sha256:
         yield (
             f"{json_file(folder, earlier.number)}: is not the preregistration that {json_file(folder, one.number).name}"
-            f" amends ({str(one.previous)[:_SHORT]}, not {earlier.short}); it was replaced: {_RESTORE}"
+            f" amends ({str(one.previous)[:SHORT]}, not {earlier.short}); it was replaced: {_RESTORE}"
         )
 
 
@@ -282,7 +282,7 @@ def _read(path: Path, number: int) -> Preregistration:
         ) from error
     if one.sha256 != stated or one.number != number or STUDY_FILE not in one.files:
         raise PreregistrationError(
-            f"{path}: was edited: its content has the hash {one.short}, and it says {str(stated)[:_SHORT]}; {_RESTORE}."
+            f"{path}: was edited: its content has the hash {one.short}, and it says {str(stated)[:SHORT]}; {_RESTORE}."
             f" A change that is meant goes into the configs; `recoil freeze {path.parent}` then writes an amendment"
         )
     return one
@@ -369,7 +369,7 @@ def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[str]:
             whose.setdefault(named, {})[code] = None
     for named, codes in whose.items():
         yield (
-            f"{chain.folder}: there is no preregistration {named[:_SHORT]} that can be trusted, which the journals of "
+            f"{chain.folder}: there is no preregistration {named[:SHORT]} that can be trusted, which the journals of "
             f"{', '.join(codes)} name; put its file preregistration-N.json back there, from a copy"
         )
 

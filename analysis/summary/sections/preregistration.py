@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from analysis.report import apa
 from analysis.report.section import Section, Table
-from analysis.summary.deviations import Deviation, StudyDeviations
+from analysis.summary.deviations import Deviation, FrozenAs, StudyDeviations
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.participants import how_many
 from experiments.study.preregistration import plain_value
@@ -19,19 +19,22 @@ def deviations_sections(report: ReportData) -> Iterator[Section]:
         whose = f": {one.study}" if len(found) > 1 else ""
         yield Section(
             title=f"Deviations from the preregistration{whose}",
-            paragraphs=(f"{_frozen(one)} {_count(one)}",),
+            paragraphs=(*map(_frozen, one.preregistrations), _count(one)),
             tables=(_table(one.deviations),) if one.deviations else (),
         )
 
 
-def _frozen(one: StudyDeviations) -> str:
-    if not one.preregistrations:
-        return "No preregistration can be trusted."
-    told = [f"preregistration {its.number} of {its.written_utc} (SHA-256 {its.sha256})" for its in one.preregistrations]
-    return f"The study was frozen: {'; '.join(told)}."
+def _frozen(one: FrozenAs) -> str:
+    begun = f"{how_many(one.begun, 'run')} of people had begun" if one.begun else "no run of a person had begun"
+    day, time = one.written_utc[:10], one.written_utc[11:16]
+    why = f" Reason: {one.reason}." if one.reason else " No reason was given." if one.number > 1 else ""
+    what = "The study was frozen" if one.number == 1 else "It was amended"
+    return f"{what} on {day}, {time} UTC, when {begun}: preregistration {one.number}, SHA-256 {one.sha256}.{why}"
 
 
 def _count(one: StudyDeviations) -> str:
+    if not one.preregistrations:
+        return "There is no preregistration that can be trusted, so nothing can be held against it."
     if not one.deviations:
         return "No deviation."
     return f"{how_many(len(one.deviations), 'deviation')}, each in a row below."
