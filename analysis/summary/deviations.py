@@ -86,8 +86,11 @@ def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, 
     Beside them what was edited or is missing, with its place, for whoever made the analysis.
     """
     found, said = list[StudyDeviations](), list[str]()
-    for results in dict.fromkeys([*(run.study for run in logs.runs), *logs.names]):
-        looked = _Looked.at(Path(results), logs) if Path(results).is_absolute() else None
+    runs: dict[str, list[RunFile]] = {name: [] for name in logs.names}
+    for run in logs.runs:
+        runs.setdefault(run.study, []).append(run)
+    for results, some in runs.items():
+        looked = _Looked.at(Path(results), logs, some) if Path(results).is_absolute() else None
         if looked is not None:
             said += looked.stand.problems
             found.append(_of_study(looked, used))
@@ -105,9 +108,8 @@ class _Looked:
     heads: tuple[tuple[RunFile, Head], ...]
 
     @classmethod
-    def at(cls, results: Path, logs: Logs) -> _Looked | None:
+    def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
         """`None` of a study that was never frozen."""
-        runs = [run for run in logs.runs if run.study == str(results)]
         chain = read_chain(results.parent)
         if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
             return None
