@@ -31,6 +31,7 @@ from experiments.study.folders import PlaceError, freeze_status, open_study, ove
 from experiments.study.preregistration import PreregistrationError, plain_value, run_warnings
 from experiments.study.study import Facts
 from recoil.config_files import new_study
+from tests.conftest import Recoil, refused
 from tests.tables_of_designs import loaded, simulated
 
 KEYS: dict[str, tuple[tuple[str, str, object, object], ...]] = {
@@ -432,3 +433,25 @@ def test_a_study_that_nobody_froze_hears_nothing_of_it(study: Path) -> None:
     assert deviations(read_logs([study / "results"]), AnalysisFiles()) == ((), ())
     assert freeze_status(study).lines() == ()
     assert isinstance(freeze(study, "", RealClock()), Frozen)
+
+
+# as a user calls it
+
+
+@pytest.mark.slow
+def test_the_commands_freeze_warn_and_report(recoil: Recoil, study: Path) -> None:
+    done = recoil("freeze", study)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "SHA-256" in done.stdout
+    edited(study, "gun.toml", "voice_coil.voltage_V", "16.0", 15.0)
+    words = ("--participant", "S01", "--screen", "synthetic", "--results", study / "results")
+    ran = recoil("run", study / "preference.toml", *words)
+    assert ran.returncode == 0
+    assert "recoil: gun.toml: voice_coil.voltage_V: frozen 16.0, now 15.0" in ran.stderr
+    looked = recoil("study", study, "--json")
+    assert json.loads(looked.stdout)["preregistration"]["changes"] == [
+        {"file": "gun.toml", "key": "voice_coil.voltage_V", "frozen": 16.0, "now": 15.0}
+    ]
+    forged(study / "preregistration-1.json", "value")
+    refused(recoil("freeze", study), "was edited", "from a copy")
+    assert recoil("check", study / "study.toml").returncode == 1
