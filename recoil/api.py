@@ -182,7 +182,7 @@ def power(
     from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.run import simulated_power
     from experiments.design.streams import checked_seed
-    from recoil.arguments import arguments_named, file_or_name, numbers_of, refusal, texts_of, whole_number
+    from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, refusal, texts_of
 
     if isinstance(target, bool) or not isinstance(target, int | float):
         raise refusal("target", target, "a number between 0 and 1, such as 0.8")
@@ -192,7 +192,7 @@ def power(
         trials=numbers_of("trials", trials),
         effects=numbers_of("effects", effects),
         methods=texts_of("methods", methods, "names", "vibration"),
-        studies=whole_number("studies", studies, "10_000"),
+        studies=count_of("studies", studies, "10_000"),
         target=target,
         seed=checked_seed(seed),
     )

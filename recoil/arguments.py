@@ -75,7 +75,7 @@ def numbers_of(name: str, values: object) -> str | None:
     return ",".join(map(str, values)) or None
 
 
-def whole_number(name: str, value: object, example: str) -> int:
+def count_of(name: str, value: object, example: str) -> int:
     """A whole number from 1."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
         raise refusal(name, value, f"a whole number from 1, such as {example}")
