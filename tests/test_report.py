@@ -90,7 +90,7 @@ def test_everything_that_the_contract_names_is_written(full: Path) -> None:
         "percentage points, 95 % CI [",
         "partial η² = .",
         "There are 840 valid response times.",
-        "Means (SD) of the correct rate on forward shots, 14 synthetic participants: Vibration",
+        "The correct rate on forward shots of 14 synthetic participants: Vibration: M = ",
         "SYNTHETIC DATA: simulated participants answered.",
         "Planned comparisons (Tukey's HSD): Asymmetric Force I was above Vibration, p",
         "The 95 % CI is within-subject (Cousineau–Morey)",

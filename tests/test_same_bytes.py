@@ -27,7 +27,7 @@ paths = [Path(path) for path in sys.argv[1:]]
 logs = read_logs(paths)
 statistics = with_everybody(summarize(logs, fits=True), logs)
 parts = {"files": logs.files, "problems": logs.problems, "remarks": logs.remarks}
-data = ReportData(title=report_title(paths), statistics=statistics, **parts)
+data = ReportData(title=report_title(logs), statistics=statistics, **parts)
 sys.stdout.buffer.write(as_json(statistics) + repr((data.title, sections(data))).encode())
 """
 

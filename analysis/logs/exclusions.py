@@ -320,16 +320,20 @@ def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Ite
         yield "drop_unanswered", table[_MEASURES[experiment][0]].isna().to_numpy(dtype=np.bool_)
 
 
+BY_HAND = "excluded"
+"""The rule that lists people."""
+
+
 def _reasons(table: pd.DataFrame, kept: pd.DataFrame, rules: Rules, experiment: str) -> Iterator[tuple[str, str, str]]:
-    """Participant, rule and reason, in the order of the file."""
+    """Participant, rule and reason; who is listed by hand is told so, whatever else holds of them."""
+    for listed in rules.excluded:
+        for code in _codes(table, listed):
+            yield code, BY_HAND, listed.reason
     yield from _too_few(table, kept, rules.participants.min_kept_share)
     if not is_rated(experiment):
         yield from _too_uniform(kept, rules.participants.max_same_response_share)
         for accuracy in rules.accuracy:
             yield from _too_often_wrong(kept, accuracy)
-    for listed in rules.excluded:
-        for code in _codes(table, listed):
-            yield code, "excluded", listed.reason
 
 
 def _too_few(table: pd.DataFrame, kept: pd.DataFrame, least: float | None) -> Iterator[tuple[str, str, str]]:

@@ -170,7 +170,9 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
 
 
 def _no_file(path: str) -> Problem:
-    study = _study(path, path.rpartition(os.sep)[0])
+    folder, _, name = path.rpartition(os.sep)
+    real = os.path.realpath(folder)
+    study = _study(f"{real}{os.sep}{name}", real)
     return BadLogError(_NO_FILE).of(Path(path), code_in_name(path) or "", experiment_in_name(path), study)
 
 

@@ -14,8 +14,9 @@ from analysis.logs.files import BadLogError, Problem
 from experiments.rebuild import table
 from experiments.record import journal, replay
 from experiments.record.journal import Contents, JournalError
-from experiments.record.tables import FILE_SUFFIX
+from experiments.record.tables import FILE_SUFFIX, DataKind
 from experiments.session.history import answered
+from experiments.study.folders import data_of
 
 RunKind = Literal["run", "practice", "set aside"]
 _NAME = re.compile(r"sub-([A-Za-z0-9]{1,32})_task-([a-z]+)(_practice)?_journal(\.aside-[0-9]+)?\.jsonl$")
@@ -35,11 +36,12 @@ class RunFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BegunRun:
-    """A run that has no table and is not finished: how far it has come."""
+    """A run that has no table and is not finished: how far it has come, and whose data it gives, as far as known."""
 
     file: RunFile
     answered: int
     planned: int
+    data: DataKind | None = None
 
     @property
     def far(self) -> str:
@@ -87,7 +89,7 @@ def made_again(run: RunFile) -> bytes | BegunRun:
         _refuse_other(run, contents)
         if not contents.finished:
             done = len(answered(replay.history(contents)))
-            return BegunRun(file=run, answered=done, planned=len(contents.plan.trials))
+            return BegunRun(file=run, answered=done, planned=len(contents.plan.trials), data=data_of(contents.head))
         return table(contents)
     except JournalError as error:
         raise BadLogError(f"its table is missing, and the journal is no help: {_without(run.path, error)}") from error

@@ -6,12 +6,15 @@ with the reason, or stand apart where they were asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
 
 from analysis.logs.design_logs import DesignLog
+from analysis.logs.files import BadLogError, Problem
+from analysis.logs.journals import BegunRun
 from analysis.logs.texts import Block, Cell, Coded
 from experiments.record.design_table import HANDS, columns
 from experiments.record.tables import DataKind, data_kind, is_simulated
@@ -71,9 +74,32 @@ def folder_of(kind: DataKind) -> str:
     return kind.replace(" ", "-")
 
 
+NEVER_TOGETHER, IN_REGISTER = "never together", "whom the register excludes is left out"
+"""The rules that leave out data of other kinds, and whom the experimenters have excluded."""
+
+
 def kept_out(kind: DataKind, first: DataKind) -> str:
     """What is said of a log of another kind than the first."""
     return (
-        f"is of {OF_KIND[kind]}, beside logs of {OF_KIND[first]} (rule: never together); read it by itself, or with "
+        f"is of {OF_KIND[kind]}, beside logs of {OF_KIND[first]} (rule: {NEVER_TOGETHER}); read it by itself, or with "
         "`--include-synthetic`, which keeps both apart"
     )
+
+
+def begun_by_kind(
+    begun: Iterable[BegunRun], kinds: Sequence[DataKind], *, alone: bool
+) -> tuple[dict[DataKind, list[BegunRun]], list[Problem]]:
+    """Unfinished runs by the kind of their data, unknown ones with the first; those of other kinds are problems.
+
+    `alone`: there are no logs, and so none that they could not stand beside.
+    """
+    found: dict[DataKind, list[BegunRun]] = {kind: [] for kind in kinds}
+    others = []
+    for one in begun:
+        kind, run = one.data or kinds[0], one.file
+        if kind in found or alone:
+            found[kind if kind in found else kinds[0]].append(one)
+        else:
+            bad = BadLogError(kept_out(kind, kinds[0]))
+            others.append(bad.of(Path(run.path), run.participant, run.experiment, run.study))
+    return found, others

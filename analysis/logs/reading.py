@@ -31,7 +31,7 @@ from analysis.logs.files import (
     study_names,
 )
 from analysis.logs.journals import BegunRun, RunFile, compared, gone, made_again, run_file, without_table
-from analysis.logs.kinds import kept_out, kind_of_design, kinds_of, kinds_there
+from analysis.logs.kinds import IN_REGISTER, begun_by_kind, kept_out, kind_of_design, kinds_of, kinds_there
 from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
@@ -72,18 +72,21 @@ class Logs:
     begun: tuple[BegunRun, ...] = ()
     runs: tuple[RunFile, ...] = ()
     """Every run whose journal was found, practices and those set aside too."""
-    joined: tuple[tuple[str, str], ...] = ()
-    """Folder and code of everyone in the registers of the folders that were read."""
+    joined: tuple[tuple[str, Member], ...] = ()
+    """Folder and entry of everyone in the registers of the folders that were read."""
     names: Mapping[str, str] = field(default_factory=dict)
     """Short names of the studies' folders."""
     methods: MethodNames = field(default_factory=MethodNames)
     """The order of methods and what they are called in print."""
 
     def person(self, study: str, code: str) -> str:
-        """What a participant is called in the tables."""
-        several = len(set(self.names.values())) > 1
-        return f"{self.names.get(study, Path(study).name)}/{code}" if several else code
+        """What a participant is called in the tables; where these hold one study alone, another's has its name."""
+        names = set(self.names.values())
+        apart = len(names) > 1 or (names and study not in self.names)
+        return f"{self.names.get(study, Path(study).name)}/{code}" if apart else code
 
+    mapped: bool = False
+    """Whether some come from other programs, read by a map: they say of no plan."""
     kind: DataKind = "real"
     apart: tuple[Logs, ...] = ()
 
@@ -129,6 +132,8 @@ class _Reading:
     """The logs of each study, experiment and code, upper and lower case alike."""
     files: dict[int, Path] = field(default_factory=dict)
     """The files of good logs, numbered."""
+    mapped: set[int] = field(default_factory=set)
+    """The numbers of the logs that other programs wrote."""
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
     """Who stands in the register of each results folder."""
     remarks: list[Problem] = field(default_factory=list)
@@ -139,6 +144,7 @@ class _Reading:
         """Take over the logs of some files."""
         self.blocks += batch.blocks
         self.kinds |= batch.kinds
+        self.mapped |= batch.mapped.keys()
         files = {one.number: one for one in waiting}
         for number, log in sorted(batch.logs.items()):
             one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
@@ -167,7 +173,8 @@ class _Reading:
         reason = self.known(results).get(log.code, Member(participant_id=log.code)).excluded
         if reason is not None:
             how = f"`recoil study DIR --readmit {log.code} --reason TEXT`"
-            raise BadLogError(f"participant {log.code} is excluded: {reason} ({how} readmits them)")
+            said = f"participant {log.code} is excluded: {reason} ({how} readmits them)"
+            raise BadLogError(f"{said} (rule: {IN_REGISTER})")
         self._check_new(study, log, number)
         self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
         self.files[number // _LOGS_A_FILE] = one.file
@@ -248,6 +255,8 @@ def read_logs(
     kinds = kinds_there(reading.kinds[number] for number in reading.studies)
     if not include_synthetic:
         reading.keep_out(kinds[0])
+    begun_of, of_others = begun_by_kind(begun, kinds if include_synthetic else kinds[:1], alone=not reading.studies)
+    reading.problems += of_others
     told = mapping.method.names if mapping else MethodNames()
     parts = kinds if include_synthetic else kinds[:1]
     first, *apart = [_of_kind(reading, designs, kind, kinds[0], told) for kind in parts]
@@ -256,10 +265,12 @@ def read_logs(
         first,
         problems=tuple(sorted(reading.problems, key=_by_place)),
         remarks=tuple(reading.remarks),
-        begun=tuple(begun),
+        begun=tuple(begun_of[kinds[0]]),
         runs=tuple(runs_of[kinds[0]]),
-        joined=tuple((os.path.realpath(where), code) for where, codes in reading.members.items() for code in codes),
-        apart=tuple(replace(part, runs=tuple(runs_of[part.kind])) for part in apart),
+        joined=tuple(
+            (os.path.realpath(where), one) for where, codes in reading.members.items() for one in codes.values()
+        ),
+        apart=tuple(replace(part, runs=tuple(runs_of[part.kind]), begun=tuple(begun_of[part.kind])) for part in apart),
     )
 
 
@@ -284,6 +295,7 @@ def _of_kind(
         files=tuple(files.values()),
         names={study: names.get(study, study) for study in mine.values()},
         kind=kind,
+        mapped=not reading.mapped.isdisjoint(mine),
     )
 
 

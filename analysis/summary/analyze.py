@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from analysis.summary.request_data import answers_to
 from analysis.summary.requests import Requests
 from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.exclusion_words import dropped_by_rule
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
@@ -62,6 +62,15 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """The files of a request, read."""
+
+    rules: Rules | None
+    requests: Requests | None
+    codebook: remarks_coding.Codebook | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Analysed:
     """Logs of one kind of data, their statistics, what rules did to them, and the tables of results by file name."""
 
@@ -82,37 +91,32 @@ def analyze(
     """
     published = load_paper(request.paper) if request.paper else None
     mapping = load(ColumnMap, request.columns) if request.columns else None
-    rules = load(Rules, request.rules) if request.rules else None
-    asked = load(Requests, request.requests) if request.requests else None
-    book = remarks_coding.load_codebook(request.codebook) if request.codebook else None
+    asked = _Asked(
+        rules=load(Rules, request.rules) if request.rules else None,
+        requests=load(Requests, request.requests) if request.requests else None,
+        codebook=remarks_coding.load_codebook(request.codebook) if request.codebook else None,
+    )
     logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
     refuse_nothing(request.paths, logs)
     parts = (replace(logs, apart=()), *logs.apart)
     with progress("analyze", _PARTS) as tell:
-        main = _analysed(parts[0], rules, request, tell)
-        others = [_analysed(part, rules, request) for part in parts[1:]]
+        main = _analysed(parts[0], asked, request, tell)
+        others = [_analysed(part, asked, request, apart=True) for part in parts[1:]]
         kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
         statistics = replace(main.statistics, kept_apart=kept_apart or None)
-        coded = None if book is None else _coded(main.logs, statistics, book)
-        if coded is not None:
-            statistics = replace(statistics, remarks=coded)
-        if asked is not None and request.requests is not None:
-            statistics = replace(statistics, requested=answers_to(asked, request.requests, main.logs))
         frozen, edited = deviations(parts[0], request.files)
         statistics = replace(statistics, preregistration=frozen or None)
         storage.make_folder(request.out)
-        report = ReportData(
-            title=report_title(request.paths),
+        report = replace(
+            _told(main),
+            title=report_title(logs),
             statistics=statistics,
             problems=logs.problems,
             remarks=logs.remarks,
             comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
-            files=logs.files,
             beside=tuple(main.tables),
             provenance=provenance() | _read_by(request.columns, mapping),
-            dropped=tuple(_notes(main.effect)),
-            extra=() if coded is None else (remarks_coding.coding_section(coded),),
-            apart=tuple(_report_apart(one) for one in others),
+            apart=tuple(_told(one) for one in others),
         )
         write_report(request.out, report, tell)
     _write_tables(request.out, main)
@@ -134,34 +138,46 @@ def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:
 def with_everybody(statistics: StudyStatistics, logs: Logs) -> StudyStatistics:
     """The statistics with whose logs could not be read among the excluded, and who is in which analysis."""
     excluded = (*statistics.excluded, *left_out_by_files(logs))
+    found = participation(logs, who_is_analysed(statistics, logs), excluded)
+    return replace(statistics, excluded=excluded, participation=found)
+
+
+def who_is_analysed(statistics: StudyStatistics, logs: Logs) -> dict[str, tuple[str, ...]]:
+    """Whose answers stand in the statistics of each experiment and design."""
     analysed = {name: found.participants.codes for name, found in statistics.analysed.items()}
-    analysed |= {one.design.design: tuple(map(str, one.table["participant_id"].unique())) for one in logs.designs}
-    return replace(statistics, excluded=excluded, participation=participation(logs, analysed, excluded))
+    return analysed | {one.design.design: tuple(map(str, one.table["participant_id"].unique())) for one in logs.designs}
 
 
 _TITLED = 3
-"""So many paths stand in the title of a report."""
+"""So many studies stand in the title of a report."""
 
 
-def report_title(paths: Sequence[Path]) -> str:
-    """What was read, whatever the order it was named in.
-
-    >>> report_title([Path("oslo"), Path("kyoto")]), report_title([Path(f"P{i}.csv") for i in range(20)])
-    ('Statistics of kyoto, oslo', 'Statistics of P0.csv, P1.csv, P10.csv and 17 more')
-    """
-    names = sorted({shown_name(path.name or path.absolute().name or path) for path in paths})
+def report_title(logs: Logs) -> str:
+    """The studies that were read, alike for a folder and for its files named one by one."""
+    every = {name for part in (logs, *logs.apart) for name in part.names.values()}
+    names = sorted({shown_name(name) for name in every if name})
     more = f" and {len(names) - _TITLED} more" if len(names) > _TITLED else ""
-    return f"Statistics of {', '.join(names[:_TITLED])}{more}"
+    return f"Statistics of {', '.join(names[:_TITLED])}{more}" if names else "Statistics"
 
 
-def _analysed(logs: Logs, rules: Rules | None, request: Request, tell: Tell = untold) -> _Analysed:
-    """The statistics of logs of one kind of data, after the rules if there are some."""
-    effect = apply_rules(logs, rules) if rules is not None else None
+def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, *, apart: bool = False) -> _Analysed:
+    """The statistics of logs of one kind of data, after the rules if there are some, with all that was asked for.
+
+    Data that are kept `apart` need not have all that is asked about: what they lack is a warning.
+    """
+    effect = apply_rules(logs, asked.rules) if asked.rules is not None else None
     used = effect.logs if effect is not None else logs
     found = summarize(used, fits=request.fits, tell=tell)
     statistics = replace(found, studies=_by_study(used, fits=request.fits))
-    if effect is not None and rules is not None and request.rules is not None:
-        statistics = _with_rules(statistics, effect, rules, request.rules)
+    if effect is not None and asked.rules is not None and request.rules is not None:
+        statistics = _with_rules(statistics, effect, asked.rules, request.rules)
+    for answered in (_with_remarks, _with_requested):
+        try:
+            statistics = answered(statistics, used, asked, request)
+        except ConfigError as error:
+            if not apart:
+                raise
+            statistics = replace(statistics, warnings=(*statistics.warnings, f"not answered here: {error}"))
     return _Analysed(
         logs=used,
         statistics=with_everybody(statistics, used),
@@ -170,9 +186,31 @@ def _analysed(logs: Logs, rules: Rules | None, request: Request, tell: Tell = un
     )
 
 
-def _report_apart(one: _Analysed) -> ReportData:
-    """What is told of data that are kept apart."""
-    return ReportData(title="", statistics=one.statistics, files=one.logs.files, dropped=tuple(_notes(one.effect)))
+def _with_remarks(statistics: StudyStatistics, logs: Logs, asked: _Asked, _: Request) -> StudyStatistics:
+    book = asked.codebook
+    return statistics if book is None else replace(statistics, remarks=_coded(logs, statistics, book))
+
+
+def _with_requested(statistics: StudyStatistics, logs: Logs, asked: _Asked, request: Request) -> StudyStatistics:
+    if asked.requests is None or request.requests is None:
+        return statistics
+    return replace(statistics, requested=answers_to(asked.requests, request.requests, logs))
+
+
+def _told(one: _Analysed) -> ReportData:
+    """What is told of data of one kind."""
+    coded = one.statistics.remarks
+    registered = ((one.logs.person(where, member.participant_id), member) for where, member in one.logs.joined)
+    return ReportData(
+        title="",
+        statistics=one.statistics,
+        files=one.logs.files,
+        dropped=tuple(_notes(one.effect)),
+        extra=() if coded is None else (remarks_coding.coding_section(coded),),
+        planned=not one.logs.mapped,
+        members=dict(registered),
+        analysed=who_is_analysed(one.statistics, one.logs),
+    )
 
 
 def _write_tables(folder: Path, one: _Analysed) -> None:
@@ -224,9 +262,7 @@ def _notes(effect: ExclusionEffect | None) -> list[str]:
         return []
     notes = []
     for experiment, people in effect.dropped.items():
-        counts = Counter[str]()
-        for by_rule in people.values():
-            counts.update(by_rule)
+        counts = dropped_by_rule(people)
         shown = ", ".join(f"{rule} {count}" for rule, count in sorted(counts.items())) or "none"
         recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")

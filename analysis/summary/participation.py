@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from analysis.logs.exclusions import LeftOut
+from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
 from experiments.study.study import by_code
 
@@ -16,7 +17,8 @@ from experiments.study.study import by_code
 class PeopleOfExperiment:
     """How many people are in the analysis of an experiment, and how many are not, by the reason.
 
-    `begun`: not finished; `not_done`: known from elsewhere. `practices` and `set_aside` count runs, which are not data.
+    `begun`: not finished; `not_done`: known from elsewhere in a study that has the experiment. `practices` and
+    `set_aside` count runs, which are not data.
     """
 
     analysed: int
@@ -47,13 +49,17 @@ class Participation:
 def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: Sequence[LeftOut]) -> Participation:
     """Look at everybody. `analysed`: by experiment, who is in its tests; `excluded`: who is not, and why."""
     within = {name: set(people) for name, people in analysed.items()}
-    why = {(one.participant, one.experiment): one for one in reversed(excluded) if one.participant and one.experiment}
+    told = [one for one in reversed(excluded) if one.participant and one.experiment and one.rule != NEVER_TOGETHER]
+    why = {(one.participant, one.experiment): one for one in told}
     begun = {(logs.person(run.file.study, run.file.participant), run.file.experiment): run for run in logs.begun}
     runs = [(logs.person(run.study, run.participant), run) for run in logs.runs]
-    joined = {logs.person(study, code) for study, code in logs.joined}
+    joined = {logs.person(study, one.participant_id) for study, one in logs.joined}
     people = set().union(joined, *within.values(), (who for who, _ in why), (who for who, _ in begun))
     people |= {who for who, _ in runs}
+    done = [*why, *begun, *((who, run.experiment) for who, run in runs)]
+    done += [(who, name) for name, some in within.items() for who in some]
     names = list(dict.fromkeys([*within, *(name for _, name in why), *(run.experiment for _, run in runs)]))
+    there = {(_study_of(who), name) for who, name in done}
 
     def state(who: str, experiment: str) -> str:
         if who in within.get(experiment, ()):
@@ -62,7 +68,7 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
             return f"begun: {begun[who, experiment].far}"
         if (who, experiment) in why:
             return f"left out: {why[who, experiment].reason}"
-        return "not done"
+        return "not done" if (_study_of(who), experiment) in there else ""
 
     order = sorted(people, key=by_code)
     absent = tuple(
@@ -87,6 +93,11 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
         },
         absent=absent,
     )
+
+
+def _study_of(who: str) -> str:
+    """The study in a participant's name; empty where there is one study only."""
+    return who.rpartition("/")[0]
 
 
 def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:

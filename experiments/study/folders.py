@@ -364,11 +364,14 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
         planned=len(plan.trials),
         last_utc=contents.records[-1].utc,
         methods=order_shown(began_with(head), plan),
-        data=tables.data_kind(
-            synthetic=head.participant == "synthetic",
-            simulated=head.gun is not None and tables.is_simulated(gun_name(head.gun)),
-        ),
+        data=data_of(head),
     )
+
+
+def data_of(head: Head) -> tables.DataKind:
+    """Whose data a run gives, by the first record of its journal."""
+    simulated = head.gun is not None and tables.is_simulated(gun_name(head.gun))
+    return tables.data_kind(synthetic=head.participant == "synthetic", simulated=simulated)
 
 
 def _is_held(where: Place) -> bool:

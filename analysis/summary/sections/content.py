@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from analysis.paper.recurrence import PatternOdds
 from analysis.report.figures.shot import ShotPanel
 from analysis.report.section import Section
 from analysis.summary.results import StudyStatistics, WithinStatistics
+from experiments.study.study import Member
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 
@@ -23,7 +24,9 @@ class ReportData:
     `files` are the logs used, `remarks` what there is to say of some, `beside` the names of the tables beside the page;
     `provenance` is label -> text; `notes` are the assumptions behind the numbers, `dropped` what rules left out of
     trials; `extra` are finished sections that follow the results; the participants may be `reconstructed` from the
-    published numbers. `apart`: the same of data of other kinds, which are kept apart.
+    published numbers. `planned`: the logs come with their plans, as those of other programs do not. `members` is what
+    the register says of people, `analysed` by experiment whose answers count. `apart`: the same of data of other kinds,
+    which are kept apart.
     """
 
     title: str
@@ -40,6 +43,9 @@ class ReportData:
     dropped: tuple[str, ...] = ()
     extra: tuple[Section, ...] = ()
     reconstructed: bool = False
+    planned: bool = True
+    members: Mapping[str, Member] = field(default_factory=dict)
+    analysed: Mapping[str, Sequence[str]] = field(default_factory=dict)
     apart: tuple[ReportData, ...] = ()
 
 

@@ -31,9 +31,10 @@ class PrintedMeasure:
         """A single value."""
         return f"{apa.number(self.scale * value, self.digits)}{self.unit}"
 
-    def mean(self, mean: float | None, sd: float | None) -> str:
-        """A mean with its SD, for a sentence."""
-        return mean_sd(mean, sd, self.scale, self.digits, self.unit)
+    def mean(self, mean: float, sd: float) -> str:
+        """A mean with its SD, for a sentence; the SD of percentages is in percentage points."""
+        spread = apa.number(self.scale * sd, self.digits)
+        return f"M = {self.value(mean)}, SD = {spread}{self.unit_of_differences}"
 
     def difference(self, value: float) -> str:
         """The size of a difference."""
@@ -75,16 +76,14 @@ def effect_sentence(found: WithinStatistics, experiment: str, *, full: bool = Fa
 def _means_words(found: WithinStatistics, printed: PrintedMeasure) -> str:
     """The means with their SDs; of one participant the values."""
     if found.n == 1:
-        values = ", ".join(f"{display_name(m)} {printed.value(found.means[m])}" for m in found.methods)
+        values = ", ".join(f"{display_name(m)}: {printed.value(found.means[m])}" for m in found.methods)
         return f"{printed.words[:1].upper()}{printed.words[1:]} of {found.people}: {values}."
-    told = {m: f"{display_name(m)} {printed.mean(found.means[m], found.sds[m])}" for m in found.methods}
+    told = {m: f"{display_name(m)}: {printed.mean(found.means[m], found.sds[m])}" for m in found.methods}
+    opening = f"{printed.words[:1].upper()}{printed.words[1:]} of {found.people}"
     if has_many(found):
         low, high = (told[end(found.methods, key=found.means.__getitem__)] for end in (min, max))
-        return (
-            f"Means (SD) of {printed.words}, {found.people}, went from {low} to {high}; the table has all {len(told)}."
-        )
-    means = ", ".join(told.values())
-    return f"Means (SD) of {printed.words}, {found.people}: {means}."
+        return f"{opening}, lowest and highest of {len(told)} means: {low}; {high}. The table has all."
+    return f"{opening}: {'; '.join(told.values())}."
 
 
 def _sizes(found: WithinStatistics, *, full: bool) -> str:
@@ -99,19 +98,23 @@ def _sizes(found: WithinStatistics, *, full: bool) -> str:
     return f"{partial}{ends}, generalised η² = {apa.below_one(size.generalized_eta_squared)}"
 
 
-def pairs_sentence(found: WithinStatistics, experiment: str, *, full: bool = False) -> str:
-    """The planned comparisons; empty where nothing was tested. `full`: with intervals, the exact p and d_z."""
+def pairs_sentence(found: WithinStatistics, experiment: str, *, full: bool = False, planned: bool = True) -> str:
+    """The comparisons of all pairs; empty where nothing was tested. `full`: with intervals, the exact p and d_z."""
     if not found.tukey or found.supplement is None:
         return ""
     if has_many(found):
         differing = sum(pair.p < SIGNIFICANT for pair in found.tukey)
-        return (
-            f"Planned comparisons (Tukey's HSD): of {len(found.tukey)} pairs {differing} differed; the table has all."
-        )
+        told = f"of {len(found.tukey)} pairs {differing} differed; the table has all"
+        return f"{comparisons(planned=planned)} (Tukey's HSD): {told}."
     tests = zip(found.tukey, found.supplement.paired_t, strict=True)
     pairs = "; ".join(_pair_words(pair, _tested(pair, t, experiment, full=full)) for pair, t in tests)
     note = ", 95 % CIs simultaneous" if full else ""
-    return f"Planned comparisons (Tukey's HSD{note}): {pairs}."
+    return f"{comparisons(planned=planned)} (Tukey's HSD{note}): {pairs}."
+
+
+def comparisons(*, planned: bool) -> str:
+    """What tests of all pairs are called; logs of other programs come without a plan."""
+    return "Planned comparisons" if planned else "Comparisons of all pairs"
 
 
 def _pair_words(pair: Pair, tested: str) -> str:
@@ -133,12 +136,12 @@ def _tested(pair: Pair, t: PairedT, experiment: str, *, full: bool) -> str:
     return f"{amount}, {apa.p_value(pair.p, exact=True)}{size}"
 
 
-def tukey_tables(found: WithinStatistics, experiment: str) -> tuple[Table, ...]:
-    """The planned pairs with their simultaneous intervals; no table where nothing was tested."""
+def tukey_tables(found: WithinStatistics, experiment: str, *, planned: bool = True) -> tuple[Table, ...]:
+    """The pairs with their simultaneous intervals; no table where nothing was tested."""
     if found.anova is None or not found.tukey or found.supplement is None:
         return ()
     printed = PRINTED_MEASURES[experiment]
-    unit = printed.unit_of_differences.strip()
+    unit = f" ({printed.unit_of_differences.strip()})" if printed.unit_of_differences else ""
     rows = (
         (
             f"{display_name(c.a)} − {display_name(c.b)}",
@@ -151,8 +154,8 @@ def tukey_tables(found: WithinStatistics, experiment: str) -> tuple[Table, ...]:
         for c, t in zip(found.tukey, found.supplement.paired_t, strict=True)
     )
     table = Table(
-        caption=f"Planned comparisons of {printed.words}{f' ({unit})' if unit else ''}: Tukey's HSD, repeated-measures "
-        f"error term, {found.anova.df[1]} degrees of freedom; d_z: mean difference over the SD of the differences",
+        caption=f"{comparisons(planned=planned)} of {printed.words}{unit}: Tukey's HSD, repeated-measures error term, "
+        f"{found.anova.df[1]} degrees of freedom; d_z: mean difference over the SD of the differences",
         header=("Pair", "Difference", "95 % CI, simultaneous", "q", "p", "d_z"),
         rows=tuple(rows),
     )
@@ -177,9 +180,12 @@ def _interval_cells(found: WithinStatistics, experiment: str, method: str) -> tu
 def direction_means(found: DirectionStatistics) -> Table:
     """Rates of both directions, d′, criterion and response time."""
     interval = ("95 % CI, forward [%]",) if found.within_ci else ()
+    spread = f" of {found.people}; median of the"
+    if found.n > 1:
+        spread = ": mean (SD) over participants, the SD of rates in percentage points; pooled median of the"
     return Table(
-        caption="Correct rates, sensitivity d′ and criterion: mean (SD) over participants; pooled median of the valid "
-        f"response times, and their number{within_caption(found)}",
+        caption=f"Correct rates, sensitivity d′ and criterion{spread} valid response times, and their number"
+        f"{within_caption(found)}",
         header=("Method", "Forward", *interval, "Backward", "d′", "Criterion", "Response time [s]"),
         rows=tuple(_direction_row(found, method) for method in found.methods),
     )
@@ -200,15 +206,16 @@ def _direction_row(found: DirectionStatistics, method: str) -> tuple[str, ...]:
 
 
 def mean_sd(mean: float | None, sd: float | None, scale: float, digits: int, unit: str) -> str:
-    """`mean unit (SD)`; a dash for what is undefined."""
+    """`mean unit (SD)`, the mean alone where one person has no SD; a dash for what is undefined."""
     if mean is None or math.isnan(mean):
         return apa.NO_NUMBER
-    spread = apa.NO_NUMBER if sd is None else apa.number(scale * sd, digits)
-    return f"{apa.number(scale * mean, digits)}{unit} ({spread})"
+    spread = "" if sd is None or math.isnan(sd) else f" ({apa.number(scale * sd, digits)})"
+    return f"{apa.number(scale * mean, digits)}{unit}{spread}"
 
 
 def binomial_table(found: DirectionStatistics) -> Table:
     """Each method and direction against guessing."""
+    pooled = found.n > 1
     rows = (
         (
             display_name(method),
@@ -217,34 +224,34 @@ def binomial_table(found: DirectionStatistics) -> Table:
             apa.percent(test.estimate),
             apa.interval(100.0 * test.ci_low, 100.0 * test.ci_high, 1),
             apa.p_cell(test.p),
-            apa.p_cell(test.clustering.p_adjusted),
+            *((apa.p_cell(test.clustering.p_adjusted),) if pooled else ()),
         )
         for method, tests in found.binomial.items()
         for direction, test in tests.items()
     )
+    trials = "trials pooled over participants; the last column takes into account that trials come in people"
     return Table(
-        caption="Exact binomial tests against 50 %, trials pooled over participants; the last column takes into "
-        "account that trials come in people",
-        header=("Method", "Direction", "Correct", "Rate", "95 % CI [%]", "p", "p, clustered"),
+        caption=f"Exact binomial tests against 50 %, {trials if pooled else f'trials of {found.people}'}",
+        header=("Method", "Direction", "Correct", "Rate", "95 % CI [%]", "p", *(("p, clustered",) if pooled else ())),
         rows=tuple(rows),
     )
 
 
 def preference_means(found: WithinStatistics) -> Table:
     """Mean, SD and within-subject interval of the ratings; the interval is left out where there is none."""
-    printed = PRINTED_MEASURES["preference"]
+    printed, several = PRINTED_MEASURES["preference"], found.n > 1
     rows = (
         (
             display_name(m),
             apa.number(found.means[m], printed.digits),
-            apa.number(found.sds[m], printed.digits),
+            *((apa.number(found.sds[m], printed.digits),) if several else ()),
             *_interval_cells(found, "preference", m),
         )
         for m in found.methods
     )
     return Table(
         caption=f"Ratings of {found.people}{within_caption(found)}",
-        header=("Method", "Mean", "SD", *(("95 % CI",) if found.within_ci else ())),
+        header=("Method", *(("Mean", "SD") if several else ("Rating",)), *(("95 % CI",) if found.within_ci else ())),
         rows=tuple(rows),
     )
 
@@ -263,9 +270,13 @@ def direction_section(report: ReportData) -> Iterator[Section]:
         return
     yield Section(
         title="Direction recognition",
-        paragraphs=(_DIRECTION_NOTE, f"{_binomial_sentence(found)} {found.binomial_note}"),
+        paragraphs=(_DIRECTION_NOTE, " ".join([_binomial_sentence(found), *([found.binomial_note] * (found.n > 1))])),
         pictures=(directions_picture(found),),
-        tables=(direction_means(found), *tukey_tables(found, "direction"), binomial_table(found)),
+        tables=(
+            direction_means(found),
+            *tukey_tables(found, "direction", planned=report.planned),
+            binomial_table(found),
+        ),
     )
 
 
@@ -277,7 +288,7 @@ def preference_section(report: ReportData) -> Iterator[Section]:
     yield Section(
         title="Preference",
         paragraphs=("Ratings went from 0 (dislike very much) to 10 (like very much).",),
-        tables=(preference_means(found), *tukey_tables(found, "preference")),
+        tables=(preference_means(found), *tukey_tables(found, "preference", planned=report.planned)),
     )
 
 

@@ -31,5 +31,6 @@ def glance_section(report: ReportData) -> Iterator[Section]:
 
 def _of_experiments(report: ReportData) -> Iterator[str]:
     for name, found in report.statistics.analysed.items():
-        words = " ".join(filter(None, [effect_sentence(found, name), pairs_sentence(found, name)]))
+        pairs = pairs_sentence(found, name, planned=report.planned)
+        words = " ".join(filter(None, [effect_sentence(found, name), pairs]))
         yield f"{EXPERIMENTS[name].capitalize()}: {words[:1].lower()}{words[1:]}"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from statistics import fmean, stdev
 
 from analysis.report import apa
 from analysis.report.labels import display_name
@@ -11,48 +12,78 @@ from analysis.report.section import Section
 from analysis.summary.results import DesignSummary, DirectionStatistics, StudyStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
 from analysis.summary.sections.designs import result_sentences
+from analysis.summary.sections.exclusion_words import people_left_out, trials_dropped
 from analysis.summary.sections.experiments import effect_sentence, pairs_sentence
 from analysis.summary.sections.participants import how_many
+from experiments.study.study import Facts
 
 _HOW = (
-    "Copy what you need, and add what the logs do not know: ages, sexes and handedness (recoil study lists them), "
-    "apparatus, consent. p-values below .001 are given in full; the APA prints them as p < .001."
+    "Copy what you need, and add what the logs do not know: {}apparatus, consent. p-values below .001 are given in "
+    "full; the APA prints them as p < .001."
 )
-_REASONS = 5
-"""So many reasons of exclusion are told."""
 
 
 def manuscript_section(report: ReportData) -> Iterator[Section]:
     """Participants, design, analysis and results of each experiment, then the software."""
     statistics = report.statistics
     quotes = (
-        *(text for name, found in statistics.analysed.items() for text in _of_experiment(statistics, name, found)),
-        *(text for name, found in statistics.designs.items() for text in _of_design(statistics, name, found)),
+        *(text for name, found in statistics.analysed.items() for text in _of_experiment(report, name, found)),
+        *(text for name, found in statistics.designs.items() for text in _of_design(report, name, found)),
     )
     if quotes:
-        yield Section(title="For your paper", paragraphs=(_HOW,), quotes=(*quotes, _software(statistics)))
+        known = any(member.facts and member.facts.known() for member in report.members.values())
+        how = _HOW.format("" if known else "ages, sexes and handedness (`recoil study DIR --join` keeps them), ")
+        yield Section(title="For your paper", paragraphs=(how,), quotes=(*quotes, _software(statistics)))
 
 
-def _of_experiment(statistics: StudyStatistics, name: str, found: WithinStatistics) -> Iterator[str]:
+def _of_experiment(report: ReportData, name: str, found: WithinStatistics) -> Iterator[str]:
     title = EXPERIMENTS[name].capitalize()
-    people = _people(statistics, name, found.n, found.people)
-    yield f"{title}, participants and design. {people} {_design(found)}"
+    people = _people(report, name, found.people, found.participants.codes)
+    dropped = trials_dropped(report, name)
+    yield " ".join(filter(None, [f"{title}, participants and design. {people}", dropped, _design(found)]))
     if found.anova is not None:
         yield f"{title}, analysis. {_analysis(found)}"
-    results = (effect_sentence(found, name, full=True), pairs_sentence(found, name, full=True), _guessing(found))
+    pairs = pairs_sentence(found, name, full=True, planned=report.planned)
+    results = (effect_sentence(found, name, full=True), pairs, _guessing(found))
     yield f"{title}, results. {' '.join(filter(None, results))}"
 
 
-def _people(statistics: StudyStatistics, name: str, n: int, people: str) -> str:
-    """How many were analysed, and how many not, for what reasons."""
-    gone = Counter(entry.rule or entry.reason for entry in statistics.excluded if entry.experiment == name)
-    told = f"{people} {'was' if n == 1 else 'were'} analysed"
-    if not gone:
-        return f"{told}; nobody was left out."
-    reasons = "; ".join(f"{count:,} by “{reason}”" for reason, count in gone.most_common(_REASONS))
-    rest = "; the report lists the other reasons" if len(gone) > _REASONS else ""
-    total = how_many(gone.total(), "further participant")
-    return f"{told}; {total} {'was' if gone.total() == 1 else 'were'} left out ({reasons}{rest})."
+def _people(report: ReportData, name: str, people: str, codes: Sequence[str]) -> str:
+    """How many were analysed, who they were, and how many were not, for what reasons."""
+    facts = [member.facts for code in codes if (member := report.members.get(code)) and member.facts]
+    who = "; ".join(filter(None, [_ages(facts, len(codes)), *_levels(facts, len(codes))]))
+    told = f"{people}{f' ({who})' if who else ''} {'was' if len(codes) == 1 else 'were'} analysed."
+    return f"{told} {people_left_out(report, name, frozenset(codes))}"
+
+
+def _ages(facts: Iterable[Facts], n: int) -> str:
+    """Mean, SD and range of the ages that the register holds.
+
+    >>> _ages([Facts(age_years=20), Facts(age_years=30), Facts()], 3)
+    'age of 2 of them: M = 25.0, SD = 7.1, 20 to 30 years'
+    """
+    ages = [one.age_years for one in facts if one.age_years is not None]
+    if not ages:
+        return ""
+    of = "age" if len(ages) == n else f"age of {len(ages):,} of them"
+    if len(ages) == 1:
+        return f"{of}: {ages[0]} years"
+    mean, spread = apa.number(fmean(ages), 1), apa.number(stdev(ages), 1)
+    return f"{of}: M = {mean}, SD = {spread}, {min(ages)} to {max(ages)} years"
+
+
+def _levels(facts: Iterable[Facts], n: int) -> Iterator[str]:
+    """How many of each sex and handedness, and how many did not say."""
+    people = [*facts]
+    for name, words in (("sex", _SEXES), ("handedness", _HANDS)):
+        counts = Counter(getattr(one, name) for one in people)
+        told = [f"{counts[level]:,} {word}" for level, word in words.items() if counts[level]]
+        unsaid = n - sum(counts[level] for level in words)
+        yield ", ".join([*told, *([f"{unsaid:,} of unknown {name}"] if told and unsaid else [])])
+
+
+_SEXES = {"female": "female", "male": "male", "other": "of another sex"}
+_HANDS = {"right": "right-handed", "left": "left-handed", "both": "ambidextrous"}
 
 
 def _design(found: WithinStatistics) -> str:
@@ -98,9 +129,10 @@ def _guessing(found: WithinStatistics) -> str:
     return f"Against guessing: {tests}." if tests else ""
 
 
-def _of_design(statistics: StudyStatistics, name: str, found: DesignSummary) -> Iterator[str]:
+def _of_design(report: ReportData, name: str, found: DesignSummary) -> Iterator[str]:
     synthetic = "synthetic " if found.origin.synthetic else ""
-    people = _people(statistics, name, found.n, how_many(found.n, f"{synthetic}participant"))
+    analysed = report.analysed.get(name, ())
+    people = _people(report, name, how_many(found.n, f"{synthetic}participant"), analysed)
     yield f"{found.title}, participants and design. {people} {' '.join(found.protocol)}"
     lacking = (
         f"{how_many(len(question.left_out), 'participant')} lacked a condition of {asked} and stood in no test of it."

@@ -34,19 +34,24 @@ def supplement_sections(report: ReportData) -> Iterator[Section]:
     found = {name: one for name in TITLES if (one := report.statistics.of(name)) is not None and one.supplement}
     for place, (name, one) in enumerate(found.items()):
         if one.supplement is not None and one.anova is not None:
-            yield _section(TITLES[name], one, one.supplement, one.anova.F, noted=not place)
+            yield _section(TITLES[name], one, one.supplement, one.anova.F, noted=not place, planned=report.planned)
 
 
-def _section(title: str, found: WithinStatistics, beside: Supplement, F: float, *, noted: bool) -> Section:
+def _section(
+    title: str, found: WithinStatistics, beside: Supplement, F: float, *, noted: bool, planned: bool
+) -> Section:
     answers = found if isinstance(found, DirectionStatistics) else None
-    tables = [_pairs(found, beside), *((_model_table(answers), _clustering_table(answers)) if answers else ())]
+    tables = [
+        _pairs(found, beside, planned=planned),
+        *((_model_table(answers), _clustering_table(answers)) if answers else ()),
+    ]
     return Section(
         title=title,
         paragraphs=(
             _corrected(F, beside.sphericity),
             _sizes(beside.effect_size, noted=noted),
             _friedman(beside.friedman, noted=noted),
-            *((_pairs_words(found.tukey_error_term, beside),) if noted else ()),
+            *((_pairs_words(found.tukey_error_term, beside, planned=planned),) if noted else ()),
             *((_model_words(answers.model), named(answers.clustering_note)) if answers else ()),
             _residuals(beside.diagnostics.normality, noted=noted),
             *(_assumed(found.assumptions) if noted else ("How to read them, and what they assume: as above.",)),
@@ -107,21 +112,29 @@ _PLANNED = (
 )
 
 
-def _pairs_words(error_term: str, found: Supplement) -> str:
+def _pairs_words(error_term: str, found: Supplement, *, planned: bool) -> str:
     factors = found.bayes_factors
+    opening = f"{_PLANNED} Planned: {error_term}" if planned else f"The pairs in several ways. {error_term}"
     return (
-        f"{_PLANNED} Planned: {error_term} Tukey with a pair's own error: {found.tukey_paired_note} t: paired t-tests "
+        f"{opening} Tukey with a pair's own error: {found.tukey_paired_note} t: paired t-tests "
         f"with Holm's correction. {factors.note} Here r = {apa.number(factors.r, 3)}."
     )
 
 
-def _pairs(found: WithinStatistics, beside: Supplement) -> Table:
+def _pairs(found: WithinStatistics, beside: Supplement, *, planned: bool) -> Table:
     ranks, factors = beside.friedman.post_hoc.pairs, beside.bayes_factors.pairs
     pairs = zip(found.tukey or (), beside.tukey_paired, beside.paired_t, ranks, factors, strict=True)
     return Table(
-        caption="p-values of the pairs by the planned test and by three others, and the Bayes factor",
+        caption=f"p-values of the pairs by {'the planned test and by three others' if planned else 'four tests'}, and the "
+        "Bayes factor",
         header=(
-            *("Pair", "Planned: Tukey, pooled error", "Tukey, own error", "t, Holm", "Signed ranks, Holm"),
+            *(
+                "Pair",
+                f"{'Planned: ' if planned else ''}Tukey, pooled error",
+                "Tukey, own error",
+                "t, Holm",
+                "Signed ranks, Holm",
+            ),
             "BF10",
         ),
         rows=tuple(

@@ -1,0 +1,165 @@
+"""The words for a paper count people, not entries; what stands in them of exclusions, ages and plans."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import analysis.summary.analyze as feature
+from analysis.logs.reading import read_logs
+from analysis.summary.participation import participation
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.experiments import direction_section
+from analysis.summary.sections.manuscript import manuscript_section
+from analysis.summary.sections.supplement import supplement_sections
+from experiments.clock import VirtualClock
+from experiments.study import register
+from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows
+
+Reported = Callable[..., ReportData]
+
+
+@pytest.fixture
+def reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reported:
+    """What `recoil analyze` would put on a page; no page is made."""
+
+    def run(*paths: Path, **asked: object) -> ReportData:
+        found: list[ReportData] = []
+        monkeypatch.setattr(feature, "write_report", lambda _, report, __: found.append(report))
+        feature.analyze(feature.Request(paths=paths, out=tmp_path / "out", **asked))  # type: ignore[arg-type]
+        return found[0]
+
+    return run
+
+
+def quotes(report: ReportData) -> str:
+    (section,) = manuscript_section(report)
+    return "\n".join(section.quotes)
+
+
+def of_person(rows: list[TextRow], hand: str = "participant") -> list[TextRow]:
+    """Rows as a person answers them at a gun."""
+    by = "rating_by" if "rating" in rows[0] else "response_source"
+    return [row | {by: hand, "gun": "RG-2:0007"} for row in rows]
+
+
+def person(folder: Path, code: str, *, unanswered: int = 0, ratings: bool = False) -> None:
+    rows = of_person(trial_rows(code, int(code[1:])))
+    for row in rows[:unanswered]:
+        row.update(response="", correct="", response_time_s="")
+    write_rows(trials_path(folder, code), rows)
+    if ratings:
+        write_rows(ratings_path(folder, code), of_person(rating_rows(code, int(code[1:]))))
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """Three people who are analysed; two who miss answers, one listed by hand, one excluded, and what is nobody."""
+    results = tmp_path / "results"
+    for code in ("P01", "P02", "P03", "P07", "P08"):
+        person(results, code)
+    person(results, "P04", unanswered=2)
+    person(results, "P05", unanswered=55)
+    person(results, "P06", unanswered=55)
+    write_rows(trials_path(results, "S01"), of_person(trial_rows("S01", 9), "synthetic"))
+    for code in ("P01", "P09"):  # a second log of somebody who is analysed, and one of somebody who is not
+        link = results / f"sub-{code}" / f"sub-{code}_task-direction_run-2_trials.csv"
+        link.parent.mkdir(exist_ok=True)
+        link.symlink_to(results / "nowhere.csv")
+    facts = ({"age_years": 20, "sex": "female", "handedness": "right"}, {"age_years": 25, "sex": "male"})
+    for code, known in zip(("P01", "P02"), facts, strict=True):
+        register.append(results, register.entry("joined", code, facts=known), VirtualClock())
+    register.append(results, register.entry("excluded", "P08", reason="fell ill"), VirtualClock())
+    return results
+
+
+RULES = """
+[trials]
+drop_unanswered = true
+response_time_min_s = 0.7
+[participants]
+min_kept_share = 0.5
+[[excluded]]
+code = "P06"
+reason = "left-handed"
+"""
+
+
+def test_each_person_is_left_out_once_in_plain_words_with_the_dropped_trials(
+    study: Path, reported: Reported, tmp_path: Path
+) -> None:
+    (tmp_path / "rules.toml").write_text(RULES)
+    report = reported(study, rules=tmp_path / "rules.toml")
+    said = quotes(report)
+    assert (
+        "5 participants (age of 2 of them: M = 22.5, SD = 3.5, 20 to 25 years; 1 female, 1 male, 3 of unknown " in said
+    )
+    assert "4 further participants were left out: " in said
+    for reason in (
+        "1 by hand (left-handed)",
+        "1 by hand (fell ill)",
+        "1 for too few trials kept (fewer than 50 % of them)",
+        "1 for a log that could not be used",
+    ):
+        assert reason in said
+    assert "Of 420 recorded trials " in said
+    assert "112 without an answer" in said
+    assert "with a response time below 0.7 s" in said
+    assert not any(word in said for word in ("min_kept_share", "drop_", "never together", "trusted", "synthetic"))
+
+
+def test_who_is_listed_by_hand_is_told_so_though_a_rule_would_leave_them_out(
+    study: Path, reported: Reported, tmp_path: Path
+) -> None:
+    (tmp_path / "rules.toml").write_text(RULES)
+    excluded = reported(study, rules=tmp_path / "rules.toml").statistics.excluded
+    assert {(one.rule, one.reason) for one in excluded if one.participant == "P06"} == {("excluded", "left-handed")}
+    assert next(one.rule for one in excluded if one.participant == "P05") == "min_kept_share"
+
+
+def test_a_title_is_alike_for_a_folder_and_for_its_files(study: Path, reported: Reported) -> None:
+    files = sorted(study.rglob("*_trials.csv"))
+    assert reported(study).title == reported(*files[::-1]).title == "Statistics of results"
+
+
+def test_a_lab_without_an_experiment_has_nobody_who_has_not_done_it(tmp_path: Path) -> None:
+    for code in ("P01", "P02"):
+        person(tmp_path / "kyoto", code, ratings=code == "P01")
+        person(tmp_path / "oslo", code)
+    logs = read_logs([tmp_path / "kyoto", tmp_path / "oslo"])
+    who = tuple(logs.trials["participant_id"].unique())
+    found = participation(logs, {"direction": who, "preference": ("kyoto/P01",)}, ())
+    assert [one.participant for one in found.absent] == ["kyoto/P02"]
+    assert (found.experiments["direction"].not_done, found.experiments["preference"].not_done) == (0, 1)
+
+
+COLUMNS = ("participant_id", "method", "direction", "response")
+MAP = """
+experiment = "direction"
+[participant]
+column = "who"
+[columns]
+method = "what"
+direction = "way"
+response = "said"
+[values.direction]
+forward = "forward"
+backward = "backward"
+[values.response]
+forward = "forward"
+backward = "backward"
+"""
+
+
+def test_of_logs_that_came_without_a_plan_nothing_is_called_planned(tmp_path: Path, reported: Reported) -> None:
+    (tmp_path / "map.toml").write_text(MAP)
+    rows = [trial_rows(code, seed) for seed, code in enumerate(("P01", "P02", "P03"))]
+    theirs = [[row[name] for name in COLUMNS] for some in rows for row in some]
+    text = "\n".join(",".join(row) for row in [["who", "what", "way", "said"], *theirs])
+    (tmp_path / "lab.csv").write_text(text)
+    report = reported(tmp_path / "lab.csv", columns=tmp_path / "map.toml")
+    words = repr([*manuscript_section(report), *direction_section(report), *supplement_sections(report)])
+    assert "Comparisons of all pairs" in words
+    assert "lanned" not in words
