@@ -135,6 +135,7 @@ def analyze(
     from analysis.summary.request_data import answers_to
     from analysis.summary.requests import Requests
     from analysis.summary.summary import summarize
+    from device.words import few_of_each
     from experiments.config.door import load
     from recoil.arguments import path_of
 
@@ -144,7 +145,8 @@ def analyze(
     if asked is not None and requests is not None:
         found = replace(found, requested=answers_to(asked, Path(requests), replace(logs, apart=())))
     left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
-    return replace(found, warnings=(*left_out, *map(str, logs.remarks), *found.warnings))
+    said = few_of_each([*left_out, *map(str, logs.remarks), *found.warnings])
+    return replace(found, warnings=tuple(said))
 
 
 def audit(paper: str | Path = "paper") -> Audited:

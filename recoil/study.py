@@ -142,7 +142,9 @@ def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
 
 
 def _state(run: RunProgress) -> str:
-    counts = f", {run.answered} of {run.planned} trials, last record {date_text(run.last_utc)}"
+    counts = f", {run.answered} of {run.planned} trials"
+    if run.state != "synthetic":  # whose clock is that of a simulation, often ahead of the world's
+        counts += f", last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
     gun = "on a simulated gun" if run.data == "simulated gun" else ""
     return "\n".join(filter(None, [*lines, gun, "practice done" if run.practised else ""]))

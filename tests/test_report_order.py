@@ -100,7 +100,7 @@ def test_the_words_for_a_paper_have_n_exclusions_effect_sizes_exact_p_and_softwa
     (section,) = manuscript_section(ReportData(title="T", statistics=statistics))
     told = "\n".join(section.quotes)
     for words in (
-        "14 synthetic participants were analysed; 2 further participants were left out (2 by “every trial is",
+        "14 synthetic participants were analysed. 2 further participants were left out: 2 for unanswered trials.",
         "10 forward and 10 backward shots with each of 3 rendering methods (Vibration, Asymmetric Force I, Asymmetric",
         "F(2, 26) = 36.52, p = 2.8 × 10⁻⁸, partial η² = .74, 90 % CI [.54, .81], generalised η² = .64.",
         "Asymmetric Force II was above Vibration, by ",

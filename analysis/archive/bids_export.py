@@ -115,7 +115,7 @@ def _read_json(path: Path) -> dict[str, object]:
     """What a JSON file holds; nothing if there is none."""
     try:
         values = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return values if isinstance(values, dict) else {}
 

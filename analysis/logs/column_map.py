@@ -133,12 +133,16 @@ class MethodsMapping(Model):
         return MethodNames(order=self.levels, labels=self.labels)
 
 
+NOT_STATED = "not stated"
+"""The gun of logs whose map names none."""
+
+
 class ColumnMap(Model):
     """A whole map."""
 
     experiment: Literal["direction", "preference"]
     files_end_with: Annotated[tuple[ShortText, ...], Field(min_length=1)] = (".csv",)
-    gun: ShortText = "not stated"
+    gun: ShortText = NOT_STATED
     response_source: Literal["participant", "experimenter", "synthetic"] = "participant"
     text: TextFormat = TextFormat()
     participant: ParticipantMapping

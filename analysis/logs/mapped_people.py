@@ -67,7 +67,7 @@ def _group(pattern: str, text: str) -> str | None:
 def check_person(code: str, where: ParticipantMapping, line: int, cells: Sequence[str]) -> None:
     """`BadLogError` if a code is none, or if a pattern made it of several people's `cells`; `line` is their first."""
     if not is_code(code):
-        rule = "(rule: 1 to 32 letters or digits)"
+        rule = "(rule: 1 to 32 letters or digits, A-Z, a-z, 0-9)"
         raise BadLogError(f"{code!r} is not a code {rule}; {_remedy(code, where)}", line, where.column)
     several = list(dict.fromkeys(cells)) if where.pattern is not None else []
     if len(several) > 1:

@@ -232,7 +232,7 @@ def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -
     if code != own:
         message = f"{quoted(code)} after {own!r} (rule: one participant a file)"
     elif not _CODE.fullmatch(code):
-        message = f"{quoted(code)} is not a code (rule: 1 to 32 letters or digits)"
+        message = f"{quoted(code)} is not a code (rule: 1 to 32 letters or digits, A-Z, a-z, 0-9)"
     else:
         rule = f"sub-{names[table.texts.logs[place]]} (rule: one participant a file, the one in its name)"
         message = f"participant {code!r}, but the file is named {rule}"

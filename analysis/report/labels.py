@@ -82,14 +82,14 @@ def cut_names() -> dict[str, str]:
     return {} if names is None else {f"[{number}]": name for name, number in names.cut.items()}
 
 
-def named(text: str) -> str:
-    """`text` with the codes in it that can be no words replaced by what they are called.
+def named(text: str, *, words: bool = False) -> str:
+    """`text` with the codes in it that can be no words replaced by what they are called; with `words` all codes.
 
     >>> named("asymmetric-2 above vibration, asymmetric-10 below")
     'Asymmetric Force II above Vibration, asymmetric-10 below'
     """
     names = _IN_FORCE.get() or _Names(PAPER_LABELS)
-    codes = [code for code in names.labels if code in PAPER_LABELS or _NO_WORD.search(code)]
+    codes = [code for code in names.labels if words or code in PAPER_LABELS or _NO_WORD.search(code)]
     if not codes:
         return text
     any_code = "|".join(map(re.escape, sorted(codes, key=len, reverse=True)))

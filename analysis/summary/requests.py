@@ -173,8 +173,9 @@ def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, A
     what = request.a if request.b is None else f"{request.a} − {request.b}"
     shown = " and ".join(f"{bound:g}".replace("-", "−") for bound in bounds[:2])
     note = (
-        f"Equivalence of {what} by two one-sided t-tests (Schuirmann 1987) against {shown}: equivalent at "
-        f"{request.alpha:g} where p is below it, which is where the interval lies within the bounds."
+        f"Whether the mean of {what} lies between {shown}, by two one-sided t-tests (TOST, Schuirmann 1987), "
+        f"α = {request.alpha:g}: one test that it is above the lower bound, one that it is below the upper. p is the "
+        "larger of the two."
     )
     if request.b is None:
         return note, tost_one_sample(first, *bounds)
@@ -193,10 +194,18 @@ def _bayes_factor(request: BayesFactorRequest, data: RequestData) -> tuple[str, 
     return note, rm_anova_bayes_factor(_table(data), request.scale)
 
 
+_BINARY = (
+    " Caution: the answers are 0 or 1, which a linear model takes for numbers that may lie anywhere: its errors are "
+    'neither normal nor alike, and what it predicts may pass 0 or 1. `kind = "logistic"` is the model of such answers.'
+)
+
+
 def _mixed_model(request: MixedModelRequest, data: RequestData) -> tuple[str, AnyResult]:
+    binary = data.trials["score"].isin((0.0, 1.0)).all()
     note = (
         "Linear mixed model of single trials with a random intercept a person, fitted by REML (statsmodels "
         f"{version('statsmodels')}); Wald tests on the normal distribution.{_references(request.terms, data)}"
+        f"{_BINARY if binary else ''}"
     )
     trials = data.trials
     return note, linear_mixed_model(trials["score"], list(trials["participant_id"]), _predictors(request.terms, data))

@@ -275,10 +275,19 @@ def parsed_line(line: bytes) -> dict[str, object]:
         if b"\\u" in line:
             json.dumps(value, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
-        raise JournalError(f"not a JSON record ({error}); it was changed or damaged") from error
+        raise JournalError(f"not a JSON record ({_why_no_json(error)}); it was changed or damaged") from error
     if not isinstance(value, dict):
         raise JournalError("not a JSON object; it was changed or damaged")
     return value
+
+
+def _why_no_json(error: ValueError | RecursionError) -> str:
+    """Why a line is no record; advice on Python is nothing to whoever reads a journal."""
+    if isinstance(error, RecursionError):
+        return "it nests too deep"
+    if isinstance(error, UnicodeDecodeError):
+        return f"byte {error.start} is not UTF-8"
+    return "a number has thousands of digits" if "integer string conversion" in str(error) else str(error)
 
 
 def _no_number(name: str) -> object:

@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from analysis.report import terminal
+from device.words import few_of_each
 
 ParticipantsOption = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
 TrialsListOption = Annotated[
@@ -192,9 +193,9 @@ def times(
         bias=bias,
         profiled=profile,
     )
-    found, problems = feature.times(request, out, terminal.tracked, terminal.progress)
-    missing = [*map(str, problems), *feature.left_out(found)]
-    for one in missing:
-        terminal.say(f"recoil: left out: {one}")
-    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
-    raise terminal.end(exceptions=bool(missing))
+    done = feature.times(request, out, terminal.tracked, terminal.progress)
+    missing = [*map(str, done.problems), *feature.left_out(done.fit)]
+    for line in few_of_each([*(f"left out: {one}" for one in missing), *map(str, done.remarks)]):
+        terminal.say(f"recoil: {line}")
+    terminal.show(done.fit, f"{terminal.in_text(feature.in_short(done.fit))}\nReport: {out / 'report.html'}", as_json)
+    raise terminal.end(exceptions=bool(missing or done.remarks))

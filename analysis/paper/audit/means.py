@@ -102,13 +102,19 @@ def grim(
         check="grim",
         printed=printed.text,
         judged=judged,
-        reason=f"means of {n} scores in steps of {decimal(scale.grain)} lie {decimal(scale.grain / n)} apart",
+        reason=_apart(n, scale),
         source=_GRIM,
         step=scale.grain / n,
         below=below,
         above=above,
         contradicts=() if judged.witness else (f"n = {n}", f"grain {grain}"),
     )
+
+
+def _apart(n: int, scale: AnswerScale) -> str:
+    if n == 1:
+        return f"a single score comes in steps of {decimal(scale.grain)}"
+    return f"means of {n} scores in steps of {decimal(scale.grain)} lie {decimal(scale.grain / n)} apart"
 
 
 def check_count(n: int, name: str = "n") -> None:

@@ -9,7 +9,7 @@ from functools import partial
 from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.means import debit, grim, grimmer
 from analysis.paper.audit.page import FindingEntry, finding_entry
-from analysis.paper.audit.printed import CheckResult, read_printed
+from analysis.paper.audit.printed import CheckResult, Interval, Rounding, read_printed
 from experiments.config.door import ConfigError
 
 _NUMBER = r"[-−]?\d*[.,]?\d+"
@@ -18,11 +18,15 @@ _SCALE = re.compile(rf"\s*({_NUMBER})\s*(?:-|–|to|\.\.)\s*({_NUMBER})\s*")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeanAndSd:
-    """What was found of a mean, and of its SD if one is given and the mean can be; `not_judged` says why not."""
+    """What was found of a mean, and of its SD if one is given and the mean can be; `not_judged` says why not.
+
+    `off_scale` says that the mean lies beyond the scale, where no other reason matters.
+    """
 
     mean: FindingEntry
     sd: FindingEntry | None
     not_judged: str | None
+    off_scale: str | None = None
 
     @property
     def exceptions(self) -> bool:
@@ -31,8 +35,9 @@ class MeanAndSd:
 
     def as_text(self) -> str:
         """The verdict on each, and why."""
-        found = [one for one in (self.mean, self.sd) if one is not None]
-        return "\n".join([*map(_told, found), *([self.not_judged] if self.not_judged else [])])
+        mean = _told(self.mean) if self.off_scale is None else f"mean: {self.mean.result.verdict}. {self.off_scale}"
+        sd = [] if self.sd is None else [_told(self.sd)]
+        return "\n".join([mean, *sd, *([self.not_judged] if self.not_judged else [])])
 
 
 def _told(one: FindingEntry) -> str:
@@ -53,12 +58,18 @@ def mean_and_sd(
     """
     for option, text in (("mean", mean), ("sd", sd), ("grain", grain)):
         _check(option, text)
+    if sd is not None and read_printed(sd).value < 0:
+        raise ConfigError(f"--sd: {sd} is below 0 (rule: a standard deviation is 0 or more)")
+    if sd is not None and n == 1:
+        raise ConfigError("--sd: one score has no standard deviation; leave it out")
     low, high = _ends(scale)
     try:
         first = grim(mean, n, grain=grain, items=items, low=low, high=high)
         if sd is None or first.verdict == "not attainable":
             unsaid = None if sd is None else f"SD = {sd} is not judged, since no data have that mean."
-            return MeanAndSd(mean=_entry("mean", first), sd=None, not_judged=unsaid)
+            return MeanAndSd(
+                mean=_entry("mean", first), sd=None, not_judged=unsaid, off_scale=_off_scale(mean, low, high)
+            )
         zero_or_one = (low, high, grain, items) == ("0", "1", "1", 1)
         scores = partial(grimmer, grain=grain, items=items, low=low, high=high)
         second = (debit if zero_or_one else scores)(mean, sd, n)
@@ -84,7 +95,22 @@ def _ends(scale: str | None) -> tuple[str | None, str | None]:
         raise ConfigError(f"--scale: {scale[:40]!r} is no scale (rule: its two ends, as 1-5 or 0-100)")
     for end in found.groups():
         _check("scale", end)
+    if read_printed(found[1]).value >= read_printed(found[2]).value:
+        raise ConfigError(f"--scale: {scale} begins with its upper end (rule: the lower one first, as 1-5)")
     return found[1], found[2]
+
+
+def _off_scale(mean: str, low: str | None, high: str | None) -> str | None:
+    """What is said of a mean that lies beyond the scale however it was rounded."""
+    if low is None or high is None:
+        return None
+    within = Interval(read_printed(low).value, read_printed(high).value)
+    if within.meets(read_printed(mean).interval(Rounding.ANY)):
+        return None
+    return (
+        f"{mean} lies beyond the scale of {low} to {high}: no scores on it have such a mean, however many they are. "
+        "Either the mean or the scale is not the one of the scores."
+    )
 
 
 def _entry(place: str, result: CheckResult) -> FindingEntry:

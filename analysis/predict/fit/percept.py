@@ -27,6 +27,7 @@ from analysis.predict.fit.studies import (
 )
 from analysis.predict.synthetic_studies import piece_sizes, spread_sentence
 from analysis.report import apa
+from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
@@ -60,7 +61,8 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
     storage.make_folder(out)
     storage.write_whole(out / "fit.json", as_json(found))
     storage.write_whole(out / "percept.toml", config_text(found).encode())
-    write_page(out, f"The percept fitted to {found.source}", sections(found, histograms, out / "figures"))
+    with labelled(task.labels):
+        write_page(out, f"The percept fitted to {found.source}", sections(found, histograms, out / "figures"))
     return found
 
 

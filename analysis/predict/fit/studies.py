@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from analysis.stats.binomial import binomial_test_p
 from device.methods import Method
 from device.words import DIRECTIONS
 from experiments.config.door import ConfigError
+from experiments.config.setup import GunConfig
 from experiments.design.streams import generator
 from experiments.load import find, load_gun
 from experiments.synthetic.diffusion import People
@@ -52,7 +54,8 @@ class PerceptRequest:
 class PerceptTask:
     """A request with all that it names: forward rates, the trials behind each, methods, people, and what is published.
 
-    `source` says in words where the rates come from; without a paper there is nothing to judge by.
+    `source` says in words where the rates come from; without a paper there is nothing to judge by. `labels`: what the
+    gun calls its methods.
     """
 
     source: str
@@ -61,6 +64,7 @@ class PerceptTask:
     methods: Mapping[str, Method]
     people: People
     published: PublishedDirection | None
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_request(request: PerceptRequest) -> PerceptTask:
@@ -76,13 +80,15 @@ def read_request(request: PerceptRequest) -> PerceptTask:
     if len(rates) < len(FITTED):
         option = f"--rates {request.rates}" if request.rates is not None else str(find(request.paper))
         raise ConfigError(f"{option}: {len(rates)} rates; three numbers are fitted, so there must be at least 3")
+    gun = load_gun(find(request.gun))
     return PerceptTask(
         source=source,
         rates=rates,
         trials=trials,
-        methods=_methods(request.gun, rates),
+        methods=_methods(find(request.gun), gun, rates),
         people=scaled_spread(ASSUMED_SPREAD, request.spread),
         published=published,
+        labels={name: method.label for name, method in gun.methods.items()},
     )
 
 
@@ -129,9 +135,7 @@ def _published(request: PerceptRequest) -> PublishedDirection:
     return published
 
 
-def _methods(gun: str, rates: Mapping[str, float]) -> dict[str, Method]:
-    path = find(gun)
-    config = load_gun(path)
+def _methods(path: Path, config: GunConfig, rates: Mapping[str, float]) -> dict[str, Method]:
     strangers = [name for name in rates if name not in config.methods]
     if strangers:
         raise ConfigError(

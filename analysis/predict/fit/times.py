@@ -11,15 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.files import Problem
+from analysis.logs.files import Problem, below
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs
 from analysis.predict.fit.figures import TimesPanel, figure_times
 from analysis.predict.fit.percept import NO_OWN_TIMES
 from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit, times_fit
 from analysis.report import apa
+from analysis.report.labels import display_name, labelled, named
 from analysis.report.page import write_page
-from analysis.report.section import Picture, Section, Table, origin_table
+from analysis.report.section import PageHead, PageNotice, Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.stats.arrays import FloatArray
@@ -50,8 +51,17 @@ class TimesRequest:
     profiled: bool = False
 
 
-def times(request: TimesRequest, out: Path, track: Track, progress: Progress) -> tuple[TimesFit, tuple[Problem, ...]]:
-    """Fit, and write `fit.json`, report and figure into `out`; what was found and the logs left out are returned.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundTimes:
+    """What was found, the logs that were left out, and what there is to say of logs that were used."""
+
+    fit: TimesFit
+    problems: tuple[Problem, ...]
+    remarks: tuple[Problem, ...]
+
+
+def times(request: TimesRequest, out: Path, track: Track, progress: Progress) -> FoundTimes:
+    """Fit, and write `fit.json`, report and figure into `out`.
 
     The fits of data that are kept apart go to folders of their own in `out`.
     `ConfigError`: a range of lapses that is none. `PlaceError`: no usable log, or none of its times is the
@@ -66,7 +76,7 @@ def times(request: TimesRequest, out: Path, track: Track, progress: Progress) ->
             _fit_of(part, lapses, request, out / folder_of(part.kind), progress)
         except PlaceError as error:
             problems.append(Problem(file=part.files[0].parent, line=None, column=None, message=str(error)))
-    return found, tuple(problems)
+    return FoundTimes(fit=found, problems=tuple(problems), remarks=logs.remarks)
 
 
 def _fit_of(logs: Logs, lapses: bool | LapseRange, request: TimesRequest, out: Path, progress: Progress) -> TimesFit:
@@ -82,8 +92,17 @@ def _fit_of(logs: Logs, lapses: bool | LapseRange, request: TimesRequest, out: P
     storage.make_folder(out)
     storage.write_whole(out / "fit.json", as_json(found))
     whose = "" if logs.kind == "real" else f" of {OF_KIND[logs.kind]}"
-    write_page(out, f"The diffusion model fitted to response times{whose}", sections(found, fitted, out / "figures"))
+    title, head = f"The diffusion model fitted to response times{whose}", PageHead(notices=tuple(_notices(logs)))
+    with labelled(logs.methods.labels):
+        write_page(out, title, sections(found, fitted, out / "figures", logs.remarks), head)
     return found
+
+
+def _notices(logs: Logs) -> Iterator[PageNotice]:
+    """The line on top of a page that is not about people at a gun."""
+    if logs.kind != "real":
+        text = f"{'SYNTHETIC DATA' if logs.kind == 'synthetic' else 'SIMULATED GUN'}: the times are of"
+        yield PageNotice(text=f"{text} {OF_KIND[logs.kind]}, and no evidence about people at a gun.", kind="warning")
 
 
 def lapse_range(text: str) -> bool | LapseRange:
@@ -172,12 +191,18 @@ def _lines(found: TimesFit) -> Iterator[str]:
     if several:
         yield "one fit of all together (a compromise person, intervals by person)"
         yield from map(_estimate_line, found.together.estimates)
-    yield from (f"not identified: {name}" for name in found.together.unidentified)
+    yield from _undetermined(found)
     yield NO_OWN_TIMES
 
 
 def _estimate_line(one: MeanEstimate | Estimate) -> str:
     return f"{one.name:26} {apa.number(one.value, 3):>7} {_interval(one)}"
+
+
+def _undetermined(found: TimesFit) -> Iterator[str]:
+    """Parameters whose likelihood is flat."""
+    for name in found.together.unidentified:
+        yield f"The data do not determine {name}: other values of it fit as well, so that it has no interval."
 
 
 def left_out(found: TimesFit) -> Iterator[str]:
@@ -197,22 +222,27 @@ def _people_count(found: TimesFit) -> str:
 
 def _interval(one: MeanEstimate | Estimate, digits: int = 3) -> str:
     """An estimate's interval, or that there is none."""
-    return apa.interval(one.ci_low, one.ci_high, digits) if math.isfinite(one.ci_low) else "[not identified]"
+    return apa.interval(one.ci_low, one.ci_high, digits) if math.isfinite(one.ci_low) else "[no interval]"
 
 
-def sections(found: TimesFit, fitted: FittedTimes, figures: Path) -> tuple[Section, ...]:
-    """The page's sections; their figure is written."""
-    parts = [_estimates(found), _against(fitted, figures), _ez(found)]
+def sections(
+    found: TimesFit, fitted: FittedTimes, figures: Path, remarks: Sequence[Problem] = ()
+) -> tuple[Section, ...]:
+    """The page's sections, with what there is to say of logs that were used; their figure is written."""
+    parts = [_estimates(found, remarks), _against(fitted, figures), _ez(found)]
     parts += [_people(found)] if found.each else []
     return (*parts, _origin(found))
 
 
-def _estimates(found: TimesFit) -> Section:
+def _estimates(found: TimesFit, remarks: Sequence[Problem]) -> Section:
     header = ["Parameter", "Unit", "All together", "95 % CI"]
-    rows = [[one.name, _unit(one.name), apa.number(one.value, 3), _interval(one)] for one in found.together.estimates]
+    rows = [
+        [_parameter(one.name), _unit(one.name), apa.number(one.value, 3), _interval(one)]
+        for one in found.together.estimates
+    ]
     if found.mean_of_people is not None:
         header[2:2] = ["Mean over people", "95 % CI", "SD of people"]
-        means = {one.name: one for one in found.mean_of_people}
+        means = {_parameter(one.name): one for one in found.mean_of_people}
         for row in rows:
             row[2:2] = _mean_cells(means.get(row[0]))
     return Section(
@@ -220,7 +250,8 @@ def _estimates(found: TimesFit) -> Section:
         paragraphs=(
             f"{found.trials} trials of {_people_count(found)} with times of their own; lapses: {found.lapses}; "
             f"start {'fitted' if found.bias else 'held at one half'}.",
-            *(f"Not identified by these data: {name}." for name in found.together.unidentified),
+            *_undetermined(found),
+            *(f"Used, but: {below(remark, Path())}." for remark in remarks),
         ),
         tables=(
             Table(caption="The diffusion by maximum likelihood", header=tuple(header), rows=tuple(map(tuple, rows))),
@@ -235,6 +266,12 @@ def _profiles(profiles: dict[str, tuple[float, float]]) -> list[Table]:
     rows = tuple((name, apa.interval(low, high, 3)) for name, (low, high) in profiles.items())
     caption = "Likelihood intervals of all together, 95 %; as if people were alike"
     return [Table(caption=caption, header=("Parameter", "95 % CI"), rows=rows)] if rows else []
+
+
+def _parameter(name: str) -> str:
+    """A parameter with its method by its label."""
+    kind, _, of = name.partition(" ")
+    return f"{kind} {named(of, words=True)}" if of else kind
 
 
 def _mean_cells(mean: MeanEstimate | None) -> list[str]:
@@ -321,8 +358,8 @@ def _as_lists(found: AnsweredBy | None) -> tuple[list[float], list[float]]:
 
 
 def _ez(found: TimesFit) -> Section:
-    rows = tuple((one.method, one.instruction, *_mean_ez(one), _whose(one)) for one in found.ez)
-    pooled = tuple((one.method, one.instruction, *_pooled_ez(one)) for one in found.ez)
+    rows = tuple((display_name(one.method), one.instruction, *_mean_ez(one), _whose(one)) for one in found.ez)
+    pooled = tuple((display_name(one.method), one.instruction, *_pooled_ez(one)) for one in found.ez)
     header = ("Method", "Instruction", "Drift [1/√s]", "Boundary [√s]", "Non-decision time [s]")
     return Section(
         title="EZ-diffusion beside it",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -167,7 +167,8 @@ class GridCell:
 class Grid:
     """All cells in their order; `reference` is the paper's own design, with the published claims.
 
-    `percepts`: what the gun's shots give to feel, by method, if the participants feel it.
+    `percepts`: what the gun's shots give to feel, by method, if the participants feel it. `labels`: what the gun calls
+    its methods.
     """
 
     config: Drawn
@@ -176,6 +177,7 @@ class Grid:
     published: PublishedExperiment | None
     request: PowerRequest
     percepts: Mapping[str, Percept] | None = None
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def all_cells(self) -> tuple[GridCell, ...]:
@@ -235,6 +237,7 @@ def make_grid(request: PowerRequest) -> Grid:
         published=published,
         request=request,
         percepts=_percepts(setup, config),
+        labels={name: method.label for name, method in setup.gun.methods.items()},
     )
 
 

@@ -14,6 +14,7 @@ from analysis.predict.power.planned import ALL_PAIRS, ANOVA, ANY_PAIR
 from analysis.predict.power.results import PATTERN, DesignPower, Power, PublishedPattern, Reached, Smallest
 from analysis.predict.synthetic_studies import bias_mean, rates_words, ratings_words, spread_sentence
 from analysis.report import apa
+from analysis.report.labels import display_name, named
 from analysis.report.section import Picture, Section, Table, origin_table
 from experiments.synthetic.laws import DiffusionLaw, RatesLaw, RatingsLaw
 
@@ -48,7 +49,7 @@ def _power_lines(found: Power) -> Iterator[str]:
     yield from filter(None, [_pattern_sentence(found.published_pattern)])
     for row in found.smallest:
         if row.claim in HEADLINES:
-            methods = f", {', '.join(row.methods)}" if _varies(found, "methods") else ""
+            methods = f", {_listed(row.methods)}" if _varies(found, "methods") else ""
             setting = f"{claim_name(row.claim)}, {_effect(row.effect)}{methods}"
             yield f"The smallest design that reaches {apa.percent(found.target, 0)}, {setting}: {_reached(found, row)}"
     if too_long := sum(bool(design.too_long) for design in found.designs):
@@ -56,8 +57,12 @@ def _power_lines(found: Power) -> Iterator[str]:
 
 
 def claim_name(claim: str) -> str:
-    """A claim as people read it."""
-    return "the paper's whole pattern" if claim == PATTERN else claim
+    """A claim as people read it, with methods by their labels."""
+    return "the paper's whole pattern" if claim == PATTERN else named(claim, words=True)
+
+
+def _listed(methods: Sequence[str]) -> str:
+    return ", ".join(map(display_name, methods))
 
 
 def share_cell(share: ShareOfStudies | None) -> str:
@@ -127,7 +132,7 @@ def _smallest(found: Power) -> Section:
             (claim_name(claim), *(_reached(found, by_place.get((claim, effect))) for effect in effects))
             for claim in claims
         )
-        caption = f"The smallest design of this grid that reaches {target}: {', '.join(group[0].methods)}"
+        caption = f"The smallest design of this grid that reaches {target}: {_listed(group[0].methods)}"
         tables.append(Table(caption=caption, header=("What is to be found", *map(_effect, effects)), rows=body))
     return Section(
         title=f"The smallest design that reaches {target}",
@@ -212,7 +217,7 @@ def _pictures(found: Power, figures: Path) -> Iterator[Picture]:
         figure_power(_panels(group, x), label, found.target, figures / stem)
         yield Picture(
             stem=stem,
-            caption=f"Power over {label}; bands: 95 % Monte Carlo intervals. Methods: {', '.join(group[0].methods)}",
+            caption=f"Power over {label}; bands: 95 % Monte Carlo intervals. Methods: {_listed(group[0].methods)}",
             alt=f"Curves of the share of studies in which each claim is found, over {label}",
         )
 
@@ -293,7 +298,7 @@ def _grouped(some: Iterable[One], key: Callable[[One], object]) -> list[list[One
 
 
 def _setting(design: DesignPower) -> str:
-    methods = ", ".join(design.methods)
+    methods = _listed(design.methods)
     return f"{_effect(design.effect)}, {design.trials} trials a method ({methods})"
 
 

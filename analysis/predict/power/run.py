@@ -14,6 +14,7 @@ from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, ru
 from analysis.predict.power.page import grid_assumptions, in_short, sections
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
+from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
@@ -42,7 +43,8 @@ def power(
         tallies = _tallies(chunks, run, kept, tell)
     found = power_of(grid, iter(tallies), grid_assumptions(grid))
     storage.write_whole(out / "power.json", as_json(found))
-    write_page(out, f"Simulated power: {grid.config.design.title}", sections(found, out / "figures"))
+    with labelled(grid.labels):
+        write_page(out, f"Simulated power: {grid.config.design.title}", sections(found, out / "figures"))
     kept.unlink(missing_ok=True)
     return found
 

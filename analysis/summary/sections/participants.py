@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
+from analysis.logs.column_map import NOT_STATED
 from analysis.logs.exclusions import FINISHED, LeftOut
 from analysis.logs.files import below, names_below
 from analysis.report import apa
@@ -116,8 +117,20 @@ def _answers(origin: Origin) -> str:
 
 
 def _guns(origin: Origin) -> str:
-    names = {gun: "on the simulated gun" if gun == "simulated" else f"on the gun {gun}" for gun in origin.guns}
-    return ", ".join(f"{count:,} {names[gun]}" for gun, count in origin.guns.items()) or apa.NO_NUMBER
+    return ", ".join(f"{count:,} {_on(gun)}" for gun, count in origin.guns.items()) or apa.NO_NUMBER
+
+
+def _on(gun: str) -> str:
+    """On what trials were rendered, by the name that logs give.
+
+    >>> _on("RG-2:0007"), _on("pneumatic gun"), _on("not stated")
+    ('on the gun RG-2:0007', 'on pneumatic gun', 'on a gun that the logs do not name')
+    """
+    if gun == "simulated":
+        return "on the simulated gun"
+    if gun == NOT_STATED:
+        return "on a gun that the logs do not name"
+    return f"on {gun}" if "gun" in gun.lower().split() else f"on the gun {gun}"
 
 
 def all_left_out(report: ReportData) -> Iterator[Section]:
@@ -212,5 +225,5 @@ def _of_people(people: int, guns: Counter[str]) -> PageNotice:
             f"anything in them; the {how_many(people, 'answer')} are of people."
         )
         return PageNotice(text=text, kind="warning")
-    real = f" on {', '.join(sorted(guns))}" if guns else "; the logs name no gun"
+    real = f" {', '.join(map(_on, sorted(guns)))}" if guns else "; the logs name no gun"
     return PageNotice(text=f"{how_many(people, 'answer')} of people{real}.", kind="note")

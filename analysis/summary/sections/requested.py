@@ -62,7 +62,21 @@ def _told(one: Requested) -> str:
             return f"{spread}; {result.trials} trials."
         case RandomInterceptLogit():
             return f"SD of people's log odds {_number(result.person_sd)}; {result.trials} trials."
+        case Equivalence():
+            return _equivalence_words(result)
     return ""
+
+
+def _equivalence_words(found: Equivalence) -> str:
+    """What the two tests say: an absence of proof is no proof of a difference."""
+    level = apa.number(100.0 * (1.0 - 2.0 * found.alpha), 0)
+    told = f"The mean was {_number(found.difference)}, {level} % CI {_interval(found)}"
+    p = apa.p_value(found.p)
+    if found.p is not None and found.p < found.alpha:
+        return f"{told}, which lies within the bounds: equivalence was shown, {p}."
+    return (
+        f"{told}, which reaches beyond the bounds: equivalence was not shown, {p}; which is no proof of a difference."
+    )
 
 
 def _table(one: Requested) -> Table | None:
@@ -70,7 +84,7 @@ def _table(one: Requested) -> Table | None:
         case tuple():
             return _contrasts(f"Planned contrasts of {_data(one)}", one.result)
         case Equivalence(reason=None):
-            return _equivalence(f"Two one-sided tests of {_data(one)}; p is the larger", one.result)
+            return _equivalence(f"Two one-sided tests of {_data(one)}; p is the larger of both", one.result)
         case LinearMixedModel(reason=None):
             return _coefficients(f"Fixed effects on {_data(one)}", one.result.coefficients)
         case RandomInterceptLogit(reason=None, coefficients=found):

@@ -124,9 +124,9 @@ def _pairs_words(error_term: str, found: Supplement, *, planned: bool) -> str:
 def _pairs(found: WithinStatistics, beside: Supplement, *, planned: bool) -> Table:
     ranks, factors = beside.friedman.post_hoc.pairs, beside.bayes_factors.pairs
     pairs = zip(found.tukey or (), beside.tukey_paired, beside.paired_t, ranks, factors, strict=True)
+    tests = "the planned test and by three others" if planned else "four tests"
     return Table(
-        caption=f"p-values of the pairs by {'the planned test and by three others' if planned else 'four tests'}, and the "
-        "Bayes factor",
+        caption=f"p-values of the pairs by {tests}, and the Bayes factor",
         header=(
             *(
                 "Pair",

@@ -82,7 +82,11 @@ def _remarks(
         first = " and ".join(before)
         yield f"Order broken: {first} comes before {experiment} in this study, and {code} has not done it.", "ask"
     if person is None:
-        yield (f"{code} is new.", "good") if is_code(code) else (f"{code} is no code: letters and digits only.", "bad")
+        yield (
+            (f"{code} is new.", "good")
+            if is_code(code)
+            else (f"{code} is no code: letters and digits only (A-Z, a-z, 0-9).", "bad")
+        )
     else:
         yield _progress(person, experiment), "good"
 
