@@ -130,7 +130,7 @@ def _draw_matrix(axes: Axes, found: WithinStatistics) -> None:
         if few and not math.isnan(pair.p):
             axes.text(column, row, shown, ha="center", va="center", fontsize=7.5, color=BLACK if differs else "#777777")
     axes.set_xlim(-0.6, len(methods) - 0.4)
-    axes.set_ylim(len(methods) - 0.5, 0.5)
+    axes.set_ylim(len(methods) - 0.45, 0.45)  # with the whole line of the last row and of the first
     axes.set_yticks(range(1, len(methods)), [drawn_name(method) for method in methods[1:]], fontsize=8.0)
     axes.set_xticks([])
     axes.tick_params(length=0.0)
@@ -251,7 +251,8 @@ def _draw_rates(axes: Axes, found: DirectionStatistics) -> None:
     reference_line(axes, 50.0, "chance")
     for i, method in enumerate(methods):
         _draw_pair(axes, found, method, i)
-    axes.set_ylim(-4.0, 106.0)
+    low, high = axes.dataLim.intervaly  # of an SD that reaches beyond the scale, too
+    axes.set_ylim(min(-4.0, low - 2.0), max(106.0, high + 2.0))
     axes.set_yticks(range(0, 101, 20))
     bounded(axes, 0.0, 100.0)
 

@@ -22,6 +22,7 @@ from analysis.report.figures.style import (
     MANY_METHODS,
     drawn,
     drawn_name,
+    legend_below,
     legend_columns,
     light_grid,
     method_colour,
@@ -49,13 +50,17 @@ class _Draw(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Panel:
-    """What is drawn in each panel, and how far the axes go that all share."""
+    """What is drawn in each panel, and how far the axes go that all share.
+
+    `kinds`: fill and name of the marks that the legend explains beside the methods.
+    """
 
     draw: _Draw
     limit: Callable[[Axes, SpeedAccuracy], None]
     across: str
     upward: str
     lines: bool
+    kinds: Sequence[tuple[str, str]] = ()
 
 
 def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> None:
@@ -101,8 +106,9 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
     rows = -(-len(instructions) // columns)
     shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
     width = 5.8 if columns == 1 else 0.6 + 3.3 * columns
-    across = legend_columns(width, [drawn_name(method) for _, method in shown])
-    legend_rows = -(-len(shown) // across)
+    handles = [*_handles(shown, lines=panel.lines), *_kinds(panel)]
+    across = legend_columns(width, [str(handle.get_label()) for handle in handles])
+    legend_rows = -(-len(handles) // across)
     with drawn(path_stem, width, 0.5 + 3.7 * rows + 0.19 * (legend_rows - 1)) as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for spare in grid[len(instructions) :]:
@@ -118,7 +124,7 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
                 title = textwrap.shorten(f"({chr(ord('a') + k)}) {instruction}", 36, placeholder=" ...")
                 axes.set_title(title, loc="left", fontweight="bold", parse_math=False)
         panel.limit(grid[0], trade)
-        handles, long = _handles(shown, lines=panel.lines), 4.5 if len(shown) > MANY_METHODS else None
+        long = 4.5 if len(shown) > MANY_METHODS else None
         figure.legend(handles=handles, loc="outside upper center", ncols=across, frameon=False, handlelength=long)
 
 
@@ -136,6 +142,11 @@ def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]
         )
         for i, method in methods
     ]
+
+
+def _kinds(panel: _Panel) -> list[Line2D]:
+    marks = {"ls": "none", "marker": "o", "ms": 5.5, "mec": INK}
+    return [Line2D([], [], mfc=fill, label=name, **marks) for fill, name in panel.kinds]
 
 
 def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:  # noqa: ARG001 - one of two
@@ -162,7 +173,7 @@ def _limit_curves(axes: Axes, trade: SpeedAccuracy) -> None:
     axes.set_ylim(0.0, 100.0)
 
 
-def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:
+def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:  # noqa: ARG001 - one of two
     """Each kind of answer of each method as a column of quantiles; grey lines join equal quantiles."""
     columns: list[tuple[float, Sequence[float]]] = []
     for i, cell in cells:
@@ -185,10 +196,6 @@ def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
                 )
     _join(axes, columns, trade.quantiles)
     axes.axvline(0.5, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
-    if last:
-        kinds = (("white", "errors"), (INK, "correct answers"))
-        handles = [Line2D([], [], ls="none", marker="o", ms=5.5, mec=INK, mfc=fill, label=name) for fill, name in kinds]
-        axes.legend(handles=handles, loc="lower left", fontsize=8.0, framealpha=0.9)
 
 
 def _limit_points(axes: Axes, trade: SpeedAccuracy) -> None:
@@ -229,6 +236,7 @@ _POINTS = _Panel(
     across="probability of the answer",
     upward="response time quantile [s]",
     lines=False,
+    kinds=(("white", "errors"), (INK, "correct answers")),
 )
 
 _PLACES = {"forward": -0.19, "backward": 0.19}
@@ -244,10 +252,14 @@ def figure_response_times(found: DirectionStatistics, path_stem: Path) -> None:
         raise ValueError("the figure of response times needs at least one valid time")
     many = len(found.methods) > MANY_METHODS
     width = width_for(len(found.methods)) if many else 8.6 + 1.6 * max(0, len(found.methods) - 3)
-    with drawn(path_stem, width, 8.2 if many else 3.9) as figure:
+    known = [method for method in found.methods if times.methods.get(method)]
+    across = legend_columns(width - 0.6, [_counted(times, method) for method in known], 4)
+    height = (8.2 if many else 3.9) + 0.17 * -(-len(known) // across)
+    with drawn(path_stem, width, height) as figure:
         one, other = figure.subplots(2, 1) if many else figure.subplots(1, 2, width_ratios=[1.0, 1.15])
         _draw_shares(one, times, found.methods, _limit(times))
         _draw_boxes(other, times, found.methods)
+        legend_below(figure, one, across)  # beside the curves there is no place that none of them may cross
 
 
 def _limit(times: ResponseTimes) -> float:
@@ -262,8 +274,7 @@ def _draw_shares(axes: Axes, times: ResponseTimes, methods: Sequence[str], limit
     for i, method in enumerate(methods):
         spread = times.methods.get(method)
         if spread:
-            label = f"{drawn_name(method)} (n = {spread.n:,})"
-            line = method_line(i)
+            label, line = _counted(times, method), method_line(i)
             shares = np.arange(len(spread.percentiles))
             axes.plot(spread.percentiles, shares, color=method_colour(i), linestyle=line, linewidth=1.7, label=label)
             slowest = max(slowest, spread.percentiles[-1])
@@ -273,8 +284,12 @@ def _draw_shares(axes: Axes, times: ResponseTimes, methods: Sequence[str], limit
     axes.set_xlabel(f"response time [s]{beyond}")
     axes.set_ylabel("share of the trials answered by then [%]")
     axes.set_title("(a) Cumulative distribution", loc="left", fontweight="bold")
-    place: Any = "lower right" if len(methods) > MANY_METHODS else "best"
-    axes.legend(loc=place, ncols=1 + len(methods) // 14, fontsize=8.0, handlelength=3.2, framealpha=0.9)
+
+
+def _counted(times: ResponseTimes, method: str) -> str:
+    """A method with the number of its times, for the legend."""
+    spread = times.methods.get(method)
+    return f"{drawn_name(method)} (n = {spread.n if spread else 0:,})"
 
 
 def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> None:
