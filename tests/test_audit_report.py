@@ -13,6 +13,7 @@ from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.freedom import degrees_of_freedom
 from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count
+from analysis.paper.audit.one_number import mean_and_sd
 from analysis.paper.audit.page import (
     ELSEWHERE,
     counts,
@@ -27,6 +28,7 @@ from analysis.paper.audit.page import (
 from analysis.paper.audit.printed import CheckResult
 from analysis.paper.audit.run import audit, load_paper_file
 from analysis.report.serial import plain
+from experiments.config.door import ConfigError
 from tests.conftest import Recoil
 
 pytestmark = pytest.mark.slow
@@ -145,6 +147,30 @@ def test_a_tie_is_told_with_its_last_digit_and_the_convention() -> None:
     text = " ".join(sentences(of(percent_of_count("13%", 1, 8))))
     assert text.startswith("1 of 8, 13% is attainable: 1 of 8 is 12.5 %, printed half up.")
     assert sentences(of(percent_of_count("14%", 1, 8)))[0].startswith("1 of 8 people are 12.5 %, not 14%")
+
+
+def test_of_a_mean_beyond_its_scale_that_is_said_first() -> None:
+    found = mean_and_sd("7.2", 20, "1.1", "1-5")
+    assert found.exceptions
+    assert found.as_text().startswith("mean: not attainable. 7.2 lies beyond the scale of 1 to 5: no scores on it")
+    assert mean_and_sd("5.0", 20, None, "1-5").off_scale is None
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("3.2", 20, "1.1", "5-1"), "--scale: 5-1 begins with its upper end"),
+        (("3.2", 20, "-1.1", "1-5"), "--sd: -1.1 is below 0"),
+        (("3", 1, "0.5", "1-5"), "--sd: one score has no standard deviation"),
+    ],
+)
+def test_what_no_data_can_have_is_refused_by_its_option(given: tuple[str, int, str, str], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        mean_and_sd(*given)
+
+
+def test_a_single_score_is_no_mean_of_scores() -> None:
+    assert "a single score comes in steps of 1" in mean_and_sd("3.2", 1).as_text()
 
 
 @pytest.mark.parametrize(

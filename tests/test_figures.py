@@ -170,6 +170,36 @@ def test_without_backward_shots_there_is_no_sensitivity_to_draw(statistics: Stud
 
 
 @pytest.mark.usefixtures("vectors_alone")
+def test_no_whisker_reaches_a_title_and_no_legend_lies_over_curves(
+    statistics: StudyStatistics, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With an SD of 40 points at a mean of 90, the whisker ends at 130 %."""
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: (style.lay_out(figure), shown.append(figure)))
+    assert statistics.direction is not None
+    wide = dict.fromkeys(statistics.direction.methods, 0.4)
+    high = dict.fromkeys(statistics.direction.methods, 0.9)
+    figure_directions(replace(statistics.direction, means=high, sds=wide), tmp_path / "never")
+    figure_response_times(statistics.direction, tmp_path / "never")
+    assert shown[0].axes[0].get_ylim()[1] > 130.0
+    curves = shown[1].axes[0]
+    assert curves.get_legend() is None
+    assert not any(legend.get_window_extent().overlaps(curves.get_window_extent()) for legend in shown[1].legends)
+
+
+def test_the_matrix_of_comparisons_has_its_last_edge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))
+    methods = tuple(f"m{number}" for number in range(6))
+    for seed in (1, 2, 3):
+        write_rows(ratings_path(tmp_path, f"P{seed}"), rating_rows(f"P{seed}", seed, methods))
+    figure_8(summarize(read_logs([tmp_path])), tmp_path / "never")
+    matrix = shown[0].axes[1]
+    lowest = max(patch.get_y() + patch.get_height() for patch in matrix.patches)  # the axis goes down
+    assert matrix.get_ylim()[0] > lowest
+    assert matrix.get_ylim()[1] < min(patch.get_y() for patch in matrix.patches)
+
+
 def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: StudyStatistics, tmp_path: Path) -> None:
     assert statistics.direction is not None
     times = statistics.direction.response_times

@@ -245,7 +245,7 @@ def test_a_missing_head_is_noticed(path: Path) -> None:
     [
         (b"", "not a JSON record"),
         (b"{", "not a JSON record"),
-        (b"\xff\xfe", "not a JSON record"),
+        (b"\xff\xfe", "not a JSON record (byte 0 is not UTF-8)"),
         (b"\0\0\0\0", "not a JSON record"),
         (b"null", "not a JSON object"),
         (b"[3]", "not a JSON object"),
@@ -255,8 +255,8 @@ def test_a_missing_head_is_noticed(path: Path) -> None:
         (b'{"n":3,"kind":{}}', "kind must be one of"),
         (b'{"kind":"step"}', "record number is None, must be 3"),
         (b'{"n":"3","kind":"step"}', "record number is '3', must be 3"),
-        (b"[" * 100_000, "not a JSON record"),
-        (b'{"n":' + b"9" * 5000 + b',"kind":"step"}', "line 4"),
+        (b"[" * 100_000, "not a JSON record (it nests too deep)"),
+        (b'{"n":' + b"9" * 5000 + b',"kind":"step"}', "not a JSON record (a number has thousands of digits)"),
     ],
     ids=lambda value: str(value)[:24],
 )

@@ -19,7 +19,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from tests.conftest import Recoil, refused
 from tests.lies import journal, lines, table
-from tests.log_files import trial_rows, trials_path, write_rows, write_study
+from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 
 class LaterClock(VirtualClock):
@@ -99,6 +99,30 @@ def test_a_finished_run_without_its_table_is_analysed_exported_and_named(recoil:
     study = recoil("study", results)
     assert study.returncode == 1
     assert "is missing, though the run is finished; `recoil rebuild" in study.stderr
+
+
+def test_an_unfinished_synthetic_run_beside_people_is_kept_out_and_nobody_has_begun(tmp_path: Path) -> None:
+    broken_off(tmp_path, "S01", 9)
+    for code in ("P01", "P02"):
+        rows = [row | {"rating_by": "participant", "gun": "RG-2:0007"} for row in rating_rows(code, int(code[1:]))]
+        write_rows(ratings_path(tmp_path, code), rows)
+    logs = read_logs([tmp_path])
+    assert (logs.kind, logs.begun) == ("real", ())
+    (problem,) = logs.problems
+    assert "is of synthetic participants, beside logs of people at a gun (rule: never together)" in str(problem)
+    found = with_everybody(summarize(logs), logs).participation
+    assert found is not None
+    assert (found.experiments["preference"].begun, found.experiments["preference"].left_out) == (0, 0)
+
+
+def test_the_same_code_that_has_begun_at_another_lab_is_another_person(tmp_path: Path) -> None:
+    write_study(tmp_path / "kyoto", participants=2)
+    broken_off(tmp_path / "oslo", "P01", 9)
+    logs = read_logs([tmp_path / "kyoto", tmp_path / "oslo"])
+    found = with_everybody(summarize(logs), logs).participation
+    assert found is not None
+    assert (found.experiments["preference"].analysed, found.experiments["preference"].begun) == (2, 1)
+    assert [one.participant for one in found.absent if one.state.startswith("begun")] == ["oslo/P01"]
 
 
 @pytest.mark.parametrize("command", ["analyze", "export"])

@@ -15,6 +15,7 @@ import pytest
 
 import recoil
 from tests.conftest import Recoil
+from tests.log_files import trial_rows, trials_path, write_rows
 
 HEAVY = ("numpy", "scipy", "pandas", "matplotlib", "pydantic", "pyarrow", "numba", "PyQt6", "psychopy", "pingouin")
 
@@ -74,6 +75,17 @@ def test_whoever_is_left_out_is_named_in_the_warnings(logs: Path, tmp_path: Path
     assert found.direction.n == 2
     said = [warning for warning in found.warnings if warning.startswith("left out: ")]
     assert [str(table) in said[1], "nowhere: no such file or folder" in said[0]] == [True, True]
+
+
+def test_like_warnings_are_cut_at_five_with_their_count(tmp_path: Path) -> None:
+    for code in range(13):
+        rows = trial_rows(f"P{code}", code)
+        rows[0]["response"] = "forward" if code == 0 else "sideways"
+        rows[0]["correct"] = str(int(rows[0]["response"] == rows[0]["direction"]))
+        write_rows(trials_path(tmp_path, f"P{code}"), rows)
+    said = recoil.analyze(tmp_path).warnings
+    assert sum("sideways" in warning for warning in said) == 5
+    assert any(warning.startswith("... and 7 more like it") for warning in said)
 
 
 @pytest.mark.slow

@@ -36,7 +36,9 @@ def answered(folder: Path, people: int, source: str, gun: str) -> ReportData:
     [
         (2, "synthetic", "simulated", [("warning", "SYNTHETIC DATA: simulated participants answered.")]),
         (2, "experimenter", "simulated", [("warning", "SIMULATED GUN: 120 of 120 trials were rendered by no gun")]),
-        (2, "participant", "VCG:007", [("note", "120 answers of people on VCG:007.")]),
+        (2, "participant", "VCG:007", [("note", "120 answers of people on the gun VCG:007.")]),
+        (2, "participant", "pneumatic gun", [("note", "120 answers of people on pneumatic gun.")]),
+        (2, "participant", "not stated", [("note", "120 answers of people on a gun that the logs do not name.")]),
         (2, "participant", "", [("note", "120 answers of people; the logs name no gun.")]),
         (1, "participant", "VCG:007", [("note", "60 answers of people"), ("warning", "ONE PARTICIPANT in direction")]),
     ],

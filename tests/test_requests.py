@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from analysis.logs.reading import Logs, read_logs
 from analysis.stats.anova import rm_anova
 from analysis.stats.anova_bayes import rm_anova_bayes_factor
 from analysis.stats.contrasts import planned_contrasts
-from analysis.stats.equivalence import tost_paired
+from analysis.stats.equivalence import tost_one_sample, tost_paired
+from analysis.summary.analyze import Request, analyze
 from analysis.summary.request_data import answers_to, request_data
 from analysis.summary.requests import BayesFactorRequest, Requested, Requests
 from analysis.summary.results import StudyStatistics
@@ -25,7 +27,7 @@ from analysis.summary.sections.requested import requested_sections
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
 from tests.conftest import Recoil
-from tests.log_files import write_study
+from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.tables_of_designs import loaded, simulated
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "requests.toml"
@@ -117,6 +119,49 @@ def test_every_answer_has_its_section_with_its_numbers(answers: dict[str, Reques
     row = found["Requested: logistic mixed model, direction"].tables[0].rows[1]
     assert row[-1] == f"{math.exp(logistic.coefficients[1].estimate):.2f}"
     assert "BF10" in found["Requested: Bayes factor, direction"].paragraphs[0]
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([0.1, -0.2, 0.3, 0.0, -0.1, 0.2], "which lies within the bounds: equivalence was shown, p = .001."),
+        ([0.4, 0.6, 0.5, 0.3, 0.7, 0.45], "which reaches beyond the bounds: equivalence was not shown, p = .446, which is no"),
+    ],
+)
+def test_an_equivalence_is_told_in_words(values: list[float], said: str, answers: dict[str, Requested]) -> None:
+    asked = replace(answers["equivalence"], result=tost_one_sample(values, -0.5, 0.5))
+    (section,) = requested_sections(ReportData(title="x", statistics=StudyStatistics(requested=(asked,))))
+    assert said in section.paragraphs[0]
+    assert section.paragraphs[0].endswith("no proof of a difference.") is ("not shown" in said)
+
+
+def test_a_linear_model_of_right_and_wrong_says_that_another_is_meant_for_them(logs: Logs, tmp_path: Path) -> None:
+    (tmp_path / "requests.toml").write_text('[[requests]]\nkind = "mixed-model"\nof = "direction"\n')
+    (one,) = answers_to(load(Requests, tmp_path / "requests.toml"), tmp_path / "requests.toml", logs)
+    assert "Caution: the answers are 0 or 1" in one.note
+    assert '`kind = "logistic"`' in one.note
+
+
+def test_what_data_that_are_kept_apart_have_not_is_a_warning_and_the_rest_is_answered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("analysis.summary.analyze.write_report", lambda *_: None)  # whose figures take longest
+    hands = {"A": ("participant", "RG-2:0007"), "S": ("synthetic", "simulated")}
+    for letter, (hand, gun) in hands.items():
+        for seed in (1, 2, 3):
+            code = f"{letter}{seed}"
+            ratings = [row | {"rating_by": hand, "gun": gun} for row in rating_rows(code, seed)]
+            write_rows(ratings_path(tmp_path / "results", code), ratings)
+            if letter == "A":
+                trials = [row | {"response_source": hand, "gun": gun} for row in trial_rows(code, seed)]
+                write_rows(trials_path(tmp_path / "results", code), trials)
+    text = '[[requests]]\nkind = "bayes-factor"\nof = "{}"\n'
+    for of, said in (("preference", False), ("direction", True)):
+        (tmp_path / "requests.toml").write_text(text.format(of))
+        paths = {"paths": [tmp_path / "results"], "out": tmp_path / of, "requests": tmp_path / "requests.toml"}
+        apart = analyze(Request(**paths, include_synthetic=True))[0].kept_apart or {}  # type: ignore[arg-type]
+        assert (apart["synthetic"].requested is None) is said
+        assert any("not answered here: " in warning for warning in apart["synthetic"].warnings) is said
 
 
 def test_a_report_without_requests_has_none(logs: Logs) -> None:

@@ -75,7 +75,7 @@ def _equivalence_words(found: Equivalence) -> str:
     if found.p is not None and found.p < found.alpha:
         return f"{told}, which lies within the bounds: equivalence was shown, {p}."
     return (
-        f"{told}, which reaches beyond the bounds: equivalence was not shown, {p}; which is no proof of a difference."
+        f"{told}, which reaches beyond the bounds: equivalence was not shown, {p}, which is no proof of a difference."
     )
 
 
