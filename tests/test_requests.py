@@ -125,7 +125,7 @@ def test_every_answer_has_its_section_with_its_numbers(answers: dict[str, Reques
     ("values", "said"),
     [
         ([0.1, -0.2, 0.3, 0.0, -0.1, 0.2], "which lies within the bounds: equivalence was shown, p = .001."),
-        ([0.4, 0.6, 0.5, 0.3, 0.7, 0.45], "which reaches beyond the bounds: equivalence was not shown, p = .446, which is no"),
+        ([0.4, 0.6, 0.5, 0.3, 0.7, 0.45], "equivalence was not shown, p = .446, which is no proof"),
     ],
 )
 def test_an_equivalence_is_told_in_words(values: list[float], said: str, answers: dict[str, Requested]) -> None:

@@ -145,7 +145,7 @@ def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]
 
 
 def _kinds(panel: _Panel) -> list[Line2D]:
-    marks = {"ls": "none", "marker": "o", "ms": 5.5, "mec": INK}
+    marks: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 5.5, "mec": INK}
     return [Line2D([], [], mfc=fill, label=name, **marks) for fill, name in panel.kinds]
 
 

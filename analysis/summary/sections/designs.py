@@ -70,7 +70,7 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
 
 def _cells_words(found: DesignSummary, question: QuestionSummary) -> str:
     cells = question.preferred or question.cells
-    shown = [f"{_condition(found, question, cell)} {_mean_and_spread(question, cell)}" for cell in cells]
+    shown = [f"{_condition(found, question, cell)}: {_mean_and_spread(question, cell)}" for cell in cells]
     if len(shown) > _TOLD:
         ends = sorted(cells, key=lambda cell: (cell.mean is None, cell.mean or 0.0))
         ends = [cell for cell in ends if cell.mean is not None] or ends
@@ -78,7 +78,8 @@ def _cells_words(found: DesignSummary, question: QuestionSummary) -> str:
             f"{_mean_and_spread(question, cell)} ({_condition(found, question, cell)})" for cell in (ends[0], ends[-1])
         )
         return f"{_mean_word(question)} of {len(cells)} conditions went from {low} to {high}."
-    return f"{_mean_word(question)}: {'; '.join(shown)}."
+    opening = "" if question.kind == "rating" else f"{_mean_word(question)}, "
+    return f"{opening}{'; '.join(shown)}."
 
 
 def _mean_word(question: QuestionSummary) -> str:
@@ -89,13 +90,15 @@ def _mean_word(question: QuestionSummary) -> str:
     answers = tuple(next(iter(question.cells)).answers or ())
     words = {"number": "geometric means", "ranking": "mean ranks"}
     share = f"share of {answers[0]}" if answers else "share"
-    return share if question.kind in ("choice", "yes-no") else words.get(question.kind, "means (SD)")
+    return share if question.kind in ("choice", "yes-no") else words.get(question.kind, "means")
 
 
 def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
     if cell.right is not None:
         return f"{_mean(question, cell)} ({cell.right:,} of {cell.trials:,})"
-    return f"{_mean(question, cell)} ({apa.number(cell.sd)})" if question.kind == "rating" else _mean(question, cell)
+    if question.kind != "rating":
+        return _mean(question, cell)
+    return f"M = {_mean(question, cell)}{'' if cell.people < 2 else f', SD = {apa.number(cell.sd)}'}"
 
 
 def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
@@ -175,11 +178,11 @@ def lacking_conditions(found: DesignSummary) -> tuple[str, ...]:
 def _picture(name: str, found: DesignSummary) -> Picture:
     scored = [question for question in found.questions.values() if question.chance is not None]
     parts = ["the exact 95 % interval of all trials together"] if scored else []
-    parts += ["the SD between participants"] if len(scored) < len(found.questions) else []
-    spread = f"Whiskers: {' of right answers, else '.join(parts)}."
+    parts += ["the SD between participants"] if len(scored) < len(found.questions) and found.n > 1 else []
+    spread = f" Whiskers: {' of right answers, else '.join(parts)}." if parts else ""
     means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in found.questions.items())
     return Picture(
-        stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}. {spread}", alt=f"Means by condition. {means}"
+        stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}.{spread}", alt=f"Means by condition. {means}"
     )
 
 
@@ -217,10 +220,13 @@ def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Itera
         yield Table(caption=f"{name}: tests{note}", header=header, rows=rows)
 
 
+_SD_OF_SHARES = "SD [percentage points]"
+
+
 def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> Table:
     factors = list(dict.fromkeys(factor for cell in question.cells for factor in cell.levels))
     scored = any(cell.right is not None for cell in question.cells)
-    sd = "SD of ln" if question.kind == "number" else "SD"
+    sd = {"number": "SD of ln", "choice": _SD_OF_SHARES, "yes-no": _SD_OF_SHARES}.get(question.kind, "SD")
     last = ("95 % interval", "p against chance") if scored else (sd,)
     answers = () if question.preferred is not None else tuple(next(iter(question.cells)).answers or ())
     rows = tuple(
@@ -246,7 +252,8 @@ def _level(found: DesignSummary, cell: ConditionSummary, factor: str) -> str:
 
 def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) -> tuple[str, ...]:
     if not scored:
-        return (apa.percent(cell.sd) if question.kind in ("choice", "yes-no") else apa.number(cell.sd),)
+        shares = question.kind in ("choice", "yes-no") and cell.sd is not None
+        return (apa.number(100.0 * cell.sd, 1) if shares and cell.sd is not None else apa.number(cell.sd),)
     low, high = apa.percent(cell.ci_low), apa.percent(cell.ci_high)
     return f"{low} to {high}", apa.p_cell(cell.p)
 

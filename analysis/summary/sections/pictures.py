@@ -73,8 +73,8 @@ def results_picture(statistics: StudyStatistics, *, compared: bool) -> Picture:
     brackets = f" {shown_by}: Tukey's HSD with the repeated-measures error term ({_MARKS})." if tested else ""
     opening = f"As in the paper's Figure 8: {counts}" if compared else f"{counts[:1].upper()}{counts[1:]}"
     caption = (
-        f"{opening}. Bars{' and whiskers: mean and SD between' if largest > 1 else ': the values of the'} participants"
-        f"{'; an SD may reach beyond the scale' if largest > 1 else ''}. {_crowd_words(largest)}{brackets}"
+        f"{opening}. Bars{_SPREAD if largest > 1 else ': the values of the one participant'}. "
+        f"{_crowd_words(largest)}{brackets}"
     )
     means = ". ".join(f"{EXPERIMENTS[name].capitalize()}: {_means_words(one, name)}" for name, one in shown.items())
     tests = " ".join(_tests_words(one, name) for name, one in shown.items())
@@ -82,7 +82,12 @@ def results_picture(statistics: StudyStatistics, *, compared: bool) -> Picture:
     return Picture(stem=_RESULTS_FIGURE, caption=caption, alt=alt)
 
 
+_SPREAD = " and whiskers: mean and SD between participants; an SD may reach beyond the scale"
+
+
 def _crowd_words(largest: int) -> str:
+    if largest == 1:
+        return "Thin lines join them."
     if largest > 200:
         return "Beyond 200 participants their distribution is shaded instead of drawn person by person."
     return "Points: participants, each at the same place in every bar; thin lines join the values of one."
@@ -112,19 +117,23 @@ def directions_picture(found: DirectionStatistics) -> Picture:
     """Correct rates by direction beside d′ and criterion."""
     sensitive = any(found.sensitivity.values())
     caption = (
-        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. Large marks and "
-        f"whiskers: mean and SD. {_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
+        f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. "
+        f"{_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
     )
     rates = "; ".join(_rates_words(found, method) for method in found.methods[:_SPELLED_OUT])
     rates += f"; and {len(found.methods) - _SPELLED_OUT} more methods" if has_many(found) else ""
-    alt = f"Dot plot of the mean correct rates with everybody's values and a line at chance, 50 %. {rates}."
+    what = "mean correct rates" if found.n > 1 else "correct rates"
+    alt = f"Dot plot of the {what} with everybody's values and a line at chance, 50 %. {rates}."
     return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
 
 
 def _direction_crowd(n: int) -> str:
+    if n == 1:
+        return "Marks: the participant's values, which thin lines join."
+    means = "Large marks and whiskers: mean and SD."
     if n > 200:
-        return "Shaded: histograms over participants; in (a) forward to the left, backward to the right."
-    return "Small marks: participants; thin lines join the values of one."
+        return f"{means} Shaded: histograms over participants; in (a) forward to the left, backward to the right."
+    return f"{means} Small marks: participants; thin lines join the values of one."
 
 
 def _rates_words(found: DirectionStatistics, method: str) -> str:
@@ -144,7 +153,8 @@ def response_times_picture(found: DirectionStatistics) -> Picture | None:
     times = found.response_times
     if not times.n:
         return None
-    medians = " Points: medians of the participants." if len(times.participants) <= 200 else ""
+    medians = " Points: medians of the participants." if 1 < len(times.participants) <= 200 else ""
+    medians = " Points: the participant's medians." if len(times.participants) == 1 else medians
     caption = (
         f"Response times from the onset of the pulse, {times.n:,} valid times of {found.people}. "
         f"(a) Share of the trials answered by then. (b) By direction, n forward / backward; boxes: quartiles, "
