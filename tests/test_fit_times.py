@@ -9,11 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.predict.fit.times import lapse_range
+from analysis.predict.fit.times import TimesRequest, lapse_range, times
+from analysis.report.terminal import unseen
 from analysis.times.first_passage import distribution
 from analysis.times.fit import answered_by, fit
+from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.design.streams import generator
+from experiments.load import load_setup
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import Recoil
 from tests.decisions import decide_all, made
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
@@ -73,6 +78,7 @@ def test_known_parameters_are_found_again_within_their_intervals(logs: Path, rec
     assert {row["instruction"] for row in found["ez"]} == {"speed", "accuracy"}
     page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "drift and boundary cannot be told apart" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "SYNTHETIC DATA: the times are of synthetic participants" in page.partition("\n## ")[0]
     assert (tmp_path / "out" / "figures" / "times.png").exists()
 
 
@@ -86,6 +92,18 @@ def test_a_log_without_instructions_has_one_boundary(tmp_path: Path, recoil: Rec
     assert found["instructions"] == ["neutral"]
     assert [one["name"] for one in found["together"]["estimates"] if "boundary" in one["name"]] == ["boundary neutral"]
     assert (found["mean_of_people"], found["each"]) == (None, {})
+
+
+def test_a_table_that_was_rebuilt_is_used_and_named(tmp_path: Path) -> None:
+    setup = load_setup("direction")
+    request = RunRequest(setup=setup, participant_id="P01", results=tmp_path / "results", seed=1)
+    run(request, synthetic_screen, VirtualClock()).place.table.unlink()
+    done = times(TimesRequest(paths=[tmp_path / "results"]), tmp_path / "out", iter, unseen)
+    (remark,) = done.remarks
+    assert "its table is missing, so it was made again from this journal" in str(remark)
+    page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "Used, but: sub-P01" in page
+    assert "made again from this journal" in page
 
 
 def by_hand(rows: list[TextRow]) -> list[TextRow]:

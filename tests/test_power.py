@@ -19,7 +19,9 @@ from analysis.predict.drawn import DirectionStudies, studies_of
 from analysis.predict.jobs import on_cluster, on_processes
 from analysis.predict.power import run as feature
 from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
+from analysis.predict.power.page import claim_name
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
+from analysis.report.labels import labelled
 from analysis.report.serial import plain
 from experiments.config.door import ConfigError, leaves
 from experiments.load import load_setup, shipped_folder
@@ -235,6 +237,11 @@ def test_what_cannot_be_is_refused_in_one_message(
     assert said.startswith("recoil: ")
     assert len(said.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_claim_is_told_with_the_labels_of_the_gun() -> None:
+    with labelled({"ramp": "Slow ramp"}):
+        assert claim_name("ramp above vibration") == "Slow ramp above Vibration"
 
 
 def test_experiment_2_has_one_trial_a_method() -> None:
