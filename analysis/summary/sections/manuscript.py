@@ -32,7 +32,7 @@ def manuscript_section(report: ReportData) -> Iterator[Section]:
     )
     if quotes:
         known = any(member.facts and member.facts.known() for member in report.members.values())
-        how = _HOW.format("" if known else "ages, sexes and handedness (`recoil study DIR --join` keeps them), ")
+        how = _HOW.format("" if known else "ages, sexes and handedness (recoil study DIR --join keeps them), ")
         yield Section(title="For your paper", paragraphs=(how,), quotes=(*quotes, _software(statistics)))
 
 
