@@ -67,7 +67,9 @@ def _check_participant(table: Table, code_in_name: str | None) -> None:
     code = str(table.rows[0]["participant_id"])
     first = table.lines[0]
     if not re.fullmatch("[A-Za-z0-9]{1,32}", code):
-        raise BadLogError(f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits, A-Z, a-z, 0-9)", first, "participant_id")
+        raise BadLogError(
+            f"{_shown(code)} is not a code (rule: 1 to 32 letters or digits, A-Z, a-z, 0-9)", first, "participant_id"
+        )
     if code_in_name is not None and code_in_name != code:
         rule = f"the file is named sub-{code_in_name} (rule: one participant a file, the one in its name)"
         raise BadLogError(f"participant {code!r}, but {rule}", first, "participant_id")
