@@ -64,7 +64,6 @@ def _told(one: Requested) -> str:
             return f"SD of people's log odds {_number(result.person_sd)}; {result.trials} trials."
         case Equivalence():
             return _equivalence_words(result)
-    return ""
 
 
 def _equivalence_words(found: Equivalence) -> str:
