@@ -38,8 +38,8 @@ from tests.journals import forged, raw
 
 CONFIGS = shipped_folder()
 NAMES = (
-    "designs", "guns", "studies", "people's laws", "column maps", "mapped logs", "rules", "codebooks", "papers",
-    "own trials", "own ratings", "logs of designs", "journals", "registers", "the wire",
+    "designs", "guns", "studies", "people's laws", "column maps", "codebooks", "papers",
+    "rules", "mapped logs", "own trials", "own ratings", "logs of designs", "journals", "registers", "the wire",
 )  # fmt: skip
 """Of all readers."""
 Mutate = Callable[[bytes, Random], bytes]
@@ -371,33 +371,14 @@ def _logs(name: str, beginnings: tuple[bytes, ...], mapping: ColumnMap | None = 
     )
 
 
-def readers(runs: Path) -> dict[str, Reader]:
-    """All readers, those of what a run leaves with some real runs to begin from."""
+def _left(runs: Path, pattern: str) -> tuple[bytes, ...]:
+    return tuple(path.read_bytes() for path in sorted(runs.rglob(pattern)))
 
-    def left(pattern: str) -> tuple[bytes, ...]:
-        return tuple(path.read_bytes() for path in sorted(runs.rglob(pattern)))
 
-    journals = tuple(forged(raw(path)) for path in sorted(runs.rglob("*_journal.jsonl")))
-    logs = read_logs([runs])
-    mapping = load(ColumnMap, _written(runs.parent / "map.toml", MAP))
-    foreign = tuple(
-        data.replace(b"participant_id,experiment", b"participant_id,what") for data in left("*direction_trials.csv")
-    )
-
-    def ruled(path: Path) -> object:
-        return apply_rules(logs, load(Rules, path))
-
-    def designed(folder: Path, data: bytes) -> object:
-        source = next(iter(sorted(runs.rglob("*grip_journal.jsonl"))))
-        place = folder / "sub-P01"
-        place.mkdir(exist_ok=True)
-        (place / source.name).write_bytes(source.read_bytes())
-        (place / source.name.replace("_journal.jsonl", "_trials.csv")).write_bytes(data)
-        return read_logs([folder])
-
-    configs = Path(shutil.copytree(CONFIGS, runs.parent / "configs", dirs_exist_ok=True))
-    own = "sub-P01/sub-P01_task-{}.csv"
-    of_records = (bytes_changed, lines_changed, _rechained, _rechained, _rechained)
+def _of_configs(place: Path) -> dict[str, Reader]:
+    """The files that people write."""
+    configs = Path(shutil.copytree(CONFIGS, place / "configs", dirs_exist_ok=True))
+    claims = _claims(_shipped("examples/audit.toml")[0])
     return {
         "designs": Reader(
             read=lambda _, data: load_setup(_written(configs / "fuzzed.toml", data)),
@@ -407,24 +388,58 @@ def readers(runs: Path) -> dict[str, Reader]:
         "studies": _config(StudyConfig, *_shipped("study.toml")),
         "people's laws": _config(SyntheticAnswers, *_shipped("synthetic/*.toml")),
         "column maps": _config(ColumnMap, MAP, *_shipped("examples/columns.toml")),
-        "mapped logs": _logs("foreign.csv", foreign, mapping),
-        "rules": Reader(read=_file("rules.toml", ruled), beginnings=(RULES,)),
         "codebooks": Reader(read=_file("codes.toml", _coded), beginnings=(CODES,)),
-        "papers": Reader(
-            read=_file("paper.toml", _audited),
-            beginnings=(*_claims(_shipped("examples/audit.toml")[0]), *_shipped("paper.toml")),
+        "papers": Reader(read=_file("paper.toml", _audited), beginnings=(*claims, *_shipped("paper.toml"))),
+    }
+
+
+def _of_tables(runs: Path) -> dict[str, Reader]:
+    """The tables of runs and of other programs, and the rules about them."""
+    logs = read_logs([runs])
+    trials, ratings = _left(runs, "*direction_trials.csv"), _left(runs, "*preference_ratings.csv")
+    foreign = tuple(data.replace(b"participant_id,experiment", b"participant_id,what") for data in trials)
+    own = "sub-P01/sub-P01_task-{}.csv"
+    return {
+        "rules": Reader(
+            read=_file("rules.toml", lambda path: apply_rules(logs, load(Rules, path))), beginnings=(RULES,)
         ),
-        "own trials": _logs(own.format("direction_trials"), left("*direction_trials.csv")),
-        "own ratings": _logs(own.format("preference_ratings"), left("*preference_ratings.csv")),
-        "logs of designs": Reader(read=designed, beginnings=left("*grip_*.csv"), mutate=OF_TABLES),
-        "journals": Reader(read=_journal, beginnings=journals, mutate=of_records),
-        "registers": Reader(
-            read=_file(register.REGISTER_FILE, lambda path: register.read_register(path.parent)),
-            beginnings=REGISTERS,
-            mutate=of_records,
-        ),
+        "mapped logs": _logs("foreign.csv", foreign, load(ColumnMap, _written(runs.parent / "map.toml", MAP))),
+        "own trials": _logs(own.format("direction_trials"), trials),
+        "own ratings": _logs(own.format("preference_ratings"), ratings),
+        "logs of designs": _of_a_design(runs),
+    }
+
+
+def _of_a_design(runs: Path) -> Reader:
+    """The table of a design, beside the journal that says what its columns are."""
+    source = min(runs.rglob("*grip_journal.jsonl"))
+    kept, table_name = source.read_bytes(), source.name.replace("_journal.jsonl", "_trials.csv")
+
+    def read(folder: Path, data: bytes) -> object:
+        place = folder / "sub-P01"
+        place.mkdir(exist_ok=True)
+        _written(place / source.name, kept)
+        _written(place / table_name, data)
+        return read_logs([folder])
+
+    return Reader(read=read, beginnings=_left(runs, "*grip_*.csv"), mutate=OF_TABLES)
+
+
+def _of_records(runs: Path) -> dict[str, Reader]:
+    """What programs write for programs: journals, registers, the line to the gun."""
+    chained = (bytes_changed, lines_changed, _rechained, _rechained, _rechained)
+    journals = tuple(forged(raw(path)) for path in sorted(runs.rglob("*_journal.jsonl")))
+    registers = _file(register.REGISTER_FILE, lambda path: register.read_register(path.parent))
+    return {
+        "journals": Reader(read=_journal, beginnings=journals, mutate=chained),
+        "registers": Reader(read=registers, beginnings=REGISTERS, mutate=chained),
         "the wire": Reader(read=_said_on_the_wire, beginnings=WIRE, mutate=(bytes_changed, tokens_changed, _framed)),
     }
+
+
+def readers(runs: Path) -> dict[str, Reader]:
+    """All readers, those of what a run leaves with some real runs to begin from."""
+    return _of_configs(runs.parent) | _of_tables(runs) | _of_records(runs)
 
 
 MOST_S, MOST_MB = 5.0, 1_000
