@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analysis.paper.audit.claims import CHECKS, AnyClaim, AuditFinding, Claim
-from analysis.paper.audit.run import audit, load_paper_file
+from analysis.paper.audit.run import audit, audit_file, load_paper_file
 from analysis.paper.audit.variance_ratios import repeated_f
 from experiments.config.door import ConfigError
 from tests.exact import exact_rm_F
@@ -140,11 +140,25 @@ def test_a_fault_is_named_with_its_key(claim: str, line: int, message: str, tmp_
     assert str(error.value).startswith(f"{tmp_path / 'some.toml'}:{line}: claims.0")
 
 
-def test_a_claim_that_makes_no_sense_is_named_by_its_place(tmp_path: Path) -> None:
-    claim = 'place = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2'
-    paper = load_paper_file(written(tmp_path, f"[[claims]]\n{claim}"))
-    with pytest.raises(ValueError, match=r"II, “x”: count must lie in 0\.\.2"):
-        audit(paper)
+NO_CLAIM = '[[claims]]\nplace = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2\n'
+TOO_LARGE = '[[claims]]\nplace = "III"\nquote = "y"\nkind = "repeated-f"\nF = "4.1"\nn = 1000000\nk = 3\n'
+A_CLAIM = '[[claims]]\nplace = "IV"\nquote = "z"\nkind = "grim"\nmean = "5.21"\nn = 28\n'
+
+
+def test_a_claim_that_cannot_be_judged_is_refused_and_the_others_are_judged(tmp_path: Path) -> None:
+    audited = audit_file(str(written(tmp_path, NO_CLAIM + TOO_LARGE + A_CLAIM)))
+    assert [one.result.verdict for one in audited.findings] == ["refused", "refused", "attainable"]
+    assert audited.findings[0].result.reason.startswith("count must lie in 0..2")
+    assert audited.exceptions
+    assert "III, “y”: The claim is refused: values must be at most 20,000 in all for an F" in audited.as_text()
+    assert audited.to_dict()["verdicts"]["refused"] == 2
+
+
+def test_a_file_of_nothing_but_such_claims_is_refused_with_each_ones_place(tmp_path: Path) -> None:
+    with pytest.raises(
+        ConfigError, match=r"II, “x”: count must lie in 0\.\.2[^\n]*\n.*III, “y”: values must be at most"
+    ):
+        audit_file(str(written(tmp_path, NO_CLAIM + TOO_LARGE)))
 
 
 def test_what_is_no_toml_or_no_file_is_said(tmp_path: Path) -> None:

@@ -209,8 +209,15 @@ ComparisonVerdict = Literal[
     "only under a reading",
     "not attainable",
     "undecided",
+    "refused",
 ]
-AUDITED: tuple[ComparisonVerdict, ...] = ("attainable", "only under a reading", "not attainable", "undecided")
+AUDITED: tuple[ComparisonVerdict, ...] = (
+    "attainable",
+    "only under a reading",
+    "not attainable",
+    "undecided",
+    "refused",
+)
 """The audit's verdicts, of numbers that no log holds; the others are of numbers that were obtained or could be."""
 
 

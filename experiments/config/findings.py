@@ -12,6 +12,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 _LIKE, _MOST_FINDINGS = 5, 2_000
+_LONG_NUMBER = 1e15
 """Findings of a kind that are said, and findings that are looked at."""
 _MISSING = "is missing; it is required"
 _UNKNOWN = "unknown key; remove it or correct its spelling"
@@ -151,6 +152,11 @@ def _a_kind(finding: Any) -> str:
     return f"{key} = {finding['ctx']['tag']!r} is none of {known.replace(chr(39), '')}"
 
 
+def _bound(value: float) -> str:
+    """The end of a range in full digits: 1,000,000 and not 1e+06."""
+    return f"{value:,.0f}" if float(value).is_integer() and abs(value) < _LONG_NUMBER else f"{value:g}"
+
+
 _RULES_BY_TYPE: Mapping[str, Callable[[Any], str]] = {
     "extra_forbidden": lambda finding: str(finding["ctx"]["rule"]),
     "missing": lambda _: _MISSING,
@@ -164,10 +170,10 @@ _RULES_BY_TYPE: Mapping[str, Callable[[Any], str]] = {
     "bool_type": lambda _: "must be true or false",
     "string_type": lambda _: "must be text, in quotes",
     "finite_number": lambda _: "must be a finite number",
-    "greater_than": lambda finding: f"must be above {finding['ctx']['gt']:g}",
-    "greater_than_equal": lambda finding: f"must be at least {finding['ctx']['ge']:g}",
-    "less_than": lambda finding: f"must be below {finding['ctx']['lt']:g}",
-    "less_than_equal": lambda finding: f"must be at most {finding['ctx']['le']:g}",
+    "greater_than": lambda finding: f"must be above {_bound(finding['ctx']['gt'])}",
+    "greater_than_equal": lambda finding: f"must be at least {_bound(finding['ctx']['ge'])}",
+    "less_than": lambda finding: f"must be below {_bound(finding['ctx']['lt'])}",
+    "less_than_equal": lambda finding: f"must be at most {_bound(finding['ctx']['le'])}",
     "literal_error": lambda finding: f"must be {finding['ctx']['expected']}",
     "string_too_short": lambda _: "must not be empty",
     "string_too_long": lambda finding: f"is too long; write at most {finding['ctx']['max_length']:,} characters",

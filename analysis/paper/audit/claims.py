@@ -207,6 +207,13 @@ class UnpublishedClaim(Claim):
         )
 
 
+def refusal(reason: str) -> CheckResult:
+    """The result for a claim that cannot be checked, for this reason."""
+    return CheckResult(
+        check="refused", printed="", judged=JudgedReadings("refused"), reason=reason, source="the bounds of the audit"
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AuditFinding:
     """What the audit found of one number: where the paper prints it, in which words, and the check's result.

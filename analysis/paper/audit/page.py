@@ -52,6 +52,7 @@ _MEANING = {
     "not attainable": "proved: no such data give it under any reading that was tried",
     "not published": "needed to repeat the work, and not printed",
     "undecided": "nothing printed bears on it, or neither data nor a proof were found",
+    "refused": "the claim's own numbers make none, or are more than the audit bears",
 }
 
 
@@ -89,7 +90,7 @@ def _proofs(findings: Sequence[AuditFinding]) -> Section:
     rows = tuple(
         (f"{f.place}: “{f.quote}”", f.result.check, "; ".join(_proof(f.result)), f.result.source)
         for f in findings
-        if f.result.check not in {"stated", "unpublished", "total"}
+        if f.result.check not in {"stated", "unpublished", "total", "refused"}
     )
     header = ("Number", "Check", "The lattice and what the proof rests on", "Source")
     text = "The exact fractions, all readings that were tried and the data that give a number stand in audit.json."
@@ -133,7 +134,7 @@ def findings_text(findings: Sequence[AuditFinding]) -> str:
         f"{f.result.verdict:{verdicts}}  {f.result.check:{checks}}  {f.place:{places}}  {cut(f.quote, 56)}"
         for f in findings
     ]
-    asked = [f"{f.place}, “{f.quote}”: {' '.join(sentences(f))}" for f in findings if f.result.verdict in ATTENTION]
+    asked = [f"{f.place}, “{f.quote}”: {' '.join(sentences(f))}" for f in findings if f.result.verdict in _IN_FULL]
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts(findings).items() if count)
     return "\n".join([*lines, "", f"{len(findings)} numbers: {told or 'none'}.", *(f"\n{text}" for text in asked)])
 
@@ -145,6 +146,7 @@ def cut(text: str, most: int) -> str:
 
 ATTENTION = ("not attainable", "only under a reading")
 """The verdicts that ask something of a paper."""
+_IN_FULL = (*ATTENTION, "refused")
 _DATA = ("grim", "grimmer", "debit", "repeated-measures F", "between-subjects F")
 FAIRNESS = (
     "A number that is not attainable is a number to ask about: the verdict says that no data of the stated kind give "
@@ -234,6 +236,10 @@ def _undecided(finding: AuditFinding) -> tuple[str, str]:
     )
 
 
+def _refused_claim(finding: AuditFinding) -> tuple[str, str]:
+    return f"The claim is refused: {finding.result.reason}.", "It was not judged; the other numbers were."
+
+
 def _not_published(finding: AuditFinding) -> tuple[str, str]:
     return (
         f"{finding.result.reason}.",
@@ -248,6 +254,7 @@ _SAID: Mapping[str, Callable[[AuditFinding], tuple[str, str]]] = MappingProxyTyp
         "not attainable": _not_attainable,
         "undecided": _undecided,
         "not published": _not_published,
+        "refused": _refused_claim,
     }
 )
 

@@ -211,7 +211,7 @@ def decimal(value: Fraction, digits: int = 6) -> str:
     return f"{'-' if value < 0 else ''}{whole}.{part:0{digits}d}".rstrip("0").rstrip(".")
 
 
-AuditVerdict = Literal["attainable", "only under a reading", "not attainable", "not published", "undecided"]
+AuditVerdict = Literal["attainable", "only under a reading", "not attainable", "not published", "undecided", "refused"]
 Witness = tuple[tuple[Fraction, ...], ...]
 """Data that give the printed numbers: rows of values in the unit of the data."""
 

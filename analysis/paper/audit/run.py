@@ -53,6 +53,7 @@ from analysis.paper.audit.claims import (
     direction_claims,
     participants_claims,
     preference_claims,
+    refusal,
 )
 from analysis.paper.audit.page import FindingEntry, counts, finding_entry, findings_text, sections
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
@@ -68,7 +69,8 @@ from experiments.record.provenance import provenance
 def audit(paper: PaperFile) -> tuple[AuditFinding, ...]:
     """The findings on all claims, those of the paper's sections first; pure, and the same at every call.
 
-    `ValueError` with the place and the quote for numbers that make no such claim, such as a count above n.
+    A claim whose numbers make none, such as a count above n, or are beyond what a check bears, is refused by its
+    finding, with the rule; the others are judged.
     """
     return tuple(_finding(claim) for claim in (*derived(paper), *paper.claims))
 
@@ -89,7 +91,7 @@ def _finding(claim: Claim) -> AuditFinding:
     try:
         result = claim.run()
     except ValueError as error:
-        raise ValueError(f"{claim.place}, “{claim.quote}”: {error}") from error
+        result = refusal(str(error))
     return AuditFinding(place=claim.place, quote=claim.quote, note=claim.note, result=result, about=tuple(claim.about))
 
 
@@ -140,8 +142,8 @@ class Audited(NotebookResult):
 
     @property
     def exceptions(self) -> bool:
-        """Is any number not attainable?"""
-        return any(finding.result.verdict == "not attainable" for finding in self.findings)
+        """Is any number not attainable, or was any refused?"""
+        return any(finding.result.verdict in {"not attainable", "refused"} for finding in self.findings)
 
     @property
     def record(self) -> AuditRecord:
@@ -171,15 +173,14 @@ class Audited(NotebookResult):
 
 
 def audit_file(name: str) -> Audited:
-    """The audit of a paper's file, or of a shipped one. `ConfigError` if it cannot be used."""
+    """The audit of a paper's file, or of a shipped one. `ConfigError` if it cannot be used, or no claim of it."""
     source = find(name)
     paper = load_paper_file(source)
-    try:
-        findings = audit(paper)
-    except ValueError as error:
-        raise ConfigError(f"{source}: {error}") from error
+    findings = audit(paper)
     if not findings:
         raise ConfigError(f"{source}: makes no claims; give [[claims]], or the sections of a paper")
+    if all(finding.result.verdict == "refused" for finding in findings):
+        raise ConfigError("\n".join(f"{source}: {one.place}, “{one.quote}”: {one.result.reason}" for one in findings))
     return Audited(paper=paper, findings=findings, source=source)
 
 

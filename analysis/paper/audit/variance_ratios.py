@@ -212,7 +212,7 @@ def _claimed(F: str, means: Sequence[str] | None, sizes: tuple[int, ...], scale:
         check_count(size, "each group")
     check_count(max(sizes) - 1, "size of the largest group less 1")
     if sum(sizes) > _MOST_VALUES:
-        raise ValueError(f"values must be at most {_MOST_VALUES:,} in all for an F, not {sum(sizes)}")
+        raise ValueError(f"values must be at most {_MOST_VALUES:,} in all for an F, not {sum(sizes):,}")
     if (scale.low is None) != (scale.high is None):
         raise ValueError("a scale needs both ends or none")
     if means is not None and len(means) != len(sizes):
