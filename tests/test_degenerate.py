@@ -94,8 +94,8 @@ MISSING = pd.DataFrame({"a": [1.0, 2.0, 3.0], "b": [2.0, None, 4.0]})
 @pytest.mark.parametrize(
     ("scores", "reason"),
     [
-        (np.ones((1, 3)), "at least 2 participants and 2 conditions are needed, not 1 and 3"),
-        (np.ones((14, 1)), "at least 2 participants and 2 conditions are needed, not 14 and 1"),
+        (np.ones((1, 3)), "scores must be of at least 2 participants and 2 conditions, not 1 and 3"),
+        (np.ones((14, 1)), "scores must be of at least 2 participants and 2 conditions, not 14 and 1"),
         (np.ones(3), r"two axes \(participants, conditions\), not 1"),
         ([], "two axes"),
         ([[1.0, 2.0], [3.0, math.nan]], r"finite, but the value at index \(1, 1\) is nan"),
@@ -120,9 +120,9 @@ def test_what_cannot_be_tested_is_refused_with_its_place(
 @pytest.mark.parametrize(
     ("groups", "reason"),
     [
-        ([[1.0, 2.0]], "at least 2 groups are needed, not 1"),
+        ([[1.0, 2.0]], "groups must be at least 2, not 1"),
         ([[1.0, 2.0], []], r"groups\[1\] must hold at least one value"),
-        ([[1.0], [2.0]], "no group has two values"),
+        ([[1.0], [2.0]], "groups: none has two values"),
         ([[1.0, 2.0], [math.inf, 1.0]], r"groups\[1\] must be finite, but the value at index \(0,\) is inf"),
         ([[1.0, 2.0], ["a", "b"]], r"groups\[1\] must be numbers"),
     ],

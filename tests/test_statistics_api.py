@@ -139,7 +139,7 @@ DOUBLED = pd.concat([LONG, LONG[:1]])
         (lambda: rm_anova(LONG), r"scores\['who'\] must be numbers .* is 'P01'; a long table .* wide\(table"),
         (lambda: rm_anova({"a": [1, 2], "b": [1]}), r"scores must have as many participants .* a \(2,\), b \(1,\)"),
         (lambda: rm_anova({}), "at least 2 participants and 2 conditions"),
-        (lambda: rm_tukey_hsd(WIDE, labels="abc"), "labels: 3 different labels are needed, not 'abc'"),
+        (lambda: rm_tukey_hsd(WIDE, labels="abc"), "labels must be a list or column, not 'abc'"),
         (lambda: rm_tukey_hsd(RIGHT, confidence=95), "confidence must lie between 0 and 1, not 95"),
         (lambda: one_way_anova({"a": [1, 2], "b": ["x"]}), r"groups\['b'\] must be numbers .* is 'x'"),
         (lambda: one_way_anova({"a": [1, 2], "b": []}), r"groups\['b'\] must hold at least one value"),

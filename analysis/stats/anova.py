@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, share
+from analysis.stats.arrays import FloatArray, Values, entries, float_or_array, quoted, share
 from analysis.stats.frames import GroupTable, Label, Result, Results, ScoreTable, named_groups, named_scores
 from analysis.stats.studentized_range import studentized_range_isf, studentized_range_sf
 from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
@@ -118,7 +119,7 @@ def scores_and_names(scores: ScoreTable, labels: Sequence[Label] | None = None) 
         raise ValueError(f"scores must have two axes (participants, conditions), not {array.ndim}")
     n, k = array.shape[-2:]
     if n < 2 or k < 2:
-        raise ValueError(f"at least 2 participants and 2 conditions are needed, not {n} and {k}")
+        raise ValueError(f"scores must be of at least 2 participants and 2 conditions, not {n} and {k}")
     return array, condition_names(names if labels is None else labels, k)
 
 
@@ -140,13 +141,13 @@ def groups_and_names(
     """`groups` as `check_groups` gives them, with their labels, or else their names or numbers."""
     arrays, own = named_groups(groups, "groups")
     if len(arrays) < 2:
-        raise ValueError(f"at least 2 groups are needed, not {len(arrays)}")
+        raise ValueError(f"groups must be at least 2, not {len(arrays)}")
     names = condition_names(own if labels is None else labels, len(arrays))
     for name, array in zip(names, arrays, strict=True):
         if array.ndim < 1 or array.shape[-1] < 1:
             raise ValueError(f"groups[{name!r}] must hold at least one value along its last axis")
     if all(array.shape[-1] == 1 for array in arrays):
-        raise ValueError("no group has two values: there is no variance within groups to test against")
+        raise ValueError("groups: none has two values, so there is no variance within them to test against")
     return arrays, names
 
 
@@ -154,9 +155,10 @@ def condition_names(labels: Sequence[Label] | None, k: int) -> Sequence[Label]:
     """The labels of k conditions, numbers without them; `ValueError` unless there are k different ones."""
     if labels is None:
         return range(k)
-    if isinstance(labels, str) or len(labels) != k or len(set(labels)) != k:
-        raise ValueError(f"labels: {k} different labels are needed, not {labels!r}")
-    return labels
+    names = entries(labels, "labels")
+    if len(names) != k or len(set(names)) != k:
+        raise ValueError(f"labels: {k} different labels are needed, not {quoted(labels)}")
+    return cast("Sequence[Label]", names)
 
 
 def _anova(sums: Sums) -> Anova:

@@ -24,7 +24,7 @@ from scipy import special
 from scipy.optimize import minimize
 
 from analysis.stats.anova import F_UNDEFINED, NO_ERROR, check_groups, check_scores, one_table
-from analysis.stats.arrays import FloatArray
+from analysis.stats.arrays import FloatArray, scale_of
 from analysis.stats.diagnostics import unit_scaled
 from analysis.stats.frames import GroupTable, Result, ScoreTable
 from analysis.stats.sums_of_squares import between_sums, repeated_sums
@@ -66,7 +66,7 @@ def rm_anova_bayes_factor(
     both are orthogonal: l = n for the conditions, k for the participants.
 
     `scores`: (n participants, k conditions), one value a cell, such as each one's mean. `ValueError` as in `rm_anova`,
-    or a scale that is not above 0. Equals R's `anovaBF(y ~ condition + person, whichRandom = "person")`.
+    or a scale outside 1e-6 to 1e6. Equals R's `anovaBF(y ~ condition + person, whichRandom = "person")`.
     Source: Rouder, Morey, Speckman & Province 2012, J. Math. Psychol. 56, 356.
 
     >>> rates = [[0.5, 0.8, 0.9], [0.6, 0.7, 1.0], [0.5, 0.9, 0.8], [0.6, 0.8, 0.8]]
@@ -74,13 +74,14 @@ def rm_anova_bayes_factor(
     44.01
     """
     array = one_table(check_scores(scores))
+    of_conditions, of_people = scale_of(fixed_scale, "fixed_scale"), scale_of(random_scale, "random_scale")
     n, k = array.shape
     sums = repeated_sums(array)
     effect, people, error = (float(part) for part in (sums.effect, sums.participants, sums.error))
     if error == 0.0:
         return AnovaBayesFactor(reason=NO_ERROR if effect else F_UNDEFINED)
-    conditions = _even(n, k - 1, effect, fixed_scale, "fixed_scale")
-    participants = _even(k, n - 1, people, random_scale, "random_scale")
+    conditions = _even(n, k - 1, effect, of_conditions)
+    participants = _even(k, n - 1, people, of_people)
     return _bayes_factor(
         _log_likelihood((conditions, participants), error, n * k),
         _log_likelihood((participants,), error + effect, n * k),
@@ -90,30 +91,28 @@ def rm_anova_bayes_factor(
 def one_way_bayes_factor(groups: GroupTable, fixed_scale: float = FIXED_SCALE) -> AnovaBayesFactor:
     """BF10 of a one-way ANOVA between people: groups against none; they may differ in size.
 
-    `groups`: k >= 2 arrays (n_i,). `ValueError` as in `one_way_anova`, or a scale that is not above 0. Equals R's
+    `groups`: k >= 2 arrays (n_i,). `ValueError` as in `one_way_anova`, or a scale outside 1e-6 to 1e6. Equals R's
     `anovaBF(y ~ group)`. Source: Rouder, Morey, Speckman & Province 2012, J. Math. Psychol. 56, 356.
 
     >>> round(one_way_bayes_factor([[1.0, 2.0, 3.0], [2.0, 3.0, 4.0], [6.0, 7.0, 8.0]]).bf10, 2)
     17.48
     """
-    arrays = check_groups(groups)
+    arrays, scale = check_groups(groups), scale_of(fixed_scale, "fixed_scale")
     if any(array.ndim != 1 for array in arrays):
-        raise ValueError("each group must have one axis")
+        raise ValueError("groups must have one axis each, the values of its people")
     sums = between_sums(arrays)
     effect, error = float(sums.effect), float(sums.error)
     if error == 0.0:
         return AnovaBayesFactor(reason=NO_ERROR if effect else F_UNDEFINED)
     values = sum(array.size for array in arrays)
     log_none = -(values - 1) / 2.0 * math.log(effect + error)
-    return _bayes_factor(_log_likelihood((_uneven(arrays, effect, fixed_scale),), error, values), log_none)
+    return _bayes_factor(_log_likelihood((_uneven(arrays, effect, scale),), error, values), log_none)
 
 
-def _even(eigenvalue: int, count: int, squares: float, scale: float, name: str) -> _Factor:
+def _even(eigenvalue: int, count: int, squares: float, scale: float) -> _Factor:
     """A factor of a full table: all directions alike."""
     ones = np.ones(1)
-    return _Factor(
-        eigenvalues=ones * eigenvalue, counts=ones * count, squares=ones * squares, scale=_positive(scale, name)
-    )
+    return _Factor(eigenvalues=ones * eigenvalue, counts=ones * count, squares=ones * squares, scale=scale)
 
 
 def _uneven(groups: Sequence[FloatArray], effect: float, scale: float) -> _Factor:
@@ -133,7 +132,7 @@ def _uneven(groups: Sequence[FloatArray], effect: float, scale: float) -> _Facto
         eigenvalues=eigenvalues,
         counts=np.ones(eigenvalues.size),
         squares=squares,
-        scale=_positive(scale, "fixed_scale"),
+        scale=scale,
     )
 
 
@@ -141,12 +140,6 @@ def _scaled(groups: Sequence[FloatArray]) -> list[FloatArray]:
     """The groups less the first value of all, over a power of two."""
     together = unit_scaled(np.concatenate(groups))
     return np.split(together - together[0], np.cumsum([group.size for group in groups])[:-1])
-
-
-def _positive(scale: float, name: str) -> float:
-    if not (scale > 0.0 and math.isfinite(scale)):
-        raise ValueError(f"{name} must be above 0, not {scale}")
-    return scale
 
 
 def _bayes_factor(log_effect: float, log_none: float) -> AnovaBayesFactor:

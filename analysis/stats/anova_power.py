@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, quoted
+
+LARGEST_F, MOST_PEOPLE, MOST_CONDITIONS = 1e6, 1e9, 1e6
+MOST_NONCENTRALITY = 1e15
+"""Beyond it power is 1 in all digits that the noncentral F has, and beyond 1e20 scipy has none."""
 
 
 def cohens_f(eta_squared: ArrayLike) -> Values:
@@ -24,7 +28,9 @@ def cohens_f(eta_squared: ArrayLike) -> Values:
     >>> round(cohens_f(0.14), 4)
     0.4035
     """
-    array = _at_least(eta_squared, "eta_squared", 0.0, below=1.0)
+    array = numbers(eta_squared, "eta_squared")
+    if ((array < 0.0) | (array >= 1.0)).any():
+        raise ValueError(f"eta_squared must lie in 0 to 1, which it does not reach, not {quoted(eta_squared)}")
     return float_or_array(np.sqrt(array / (1.0 - array)))
 
 
@@ -38,11 +44,11 @@ def one_way_anova_power(f: ArrayLike, sizes: ArrayLike, alpha: ArrayLike = 0.05)
     >>> round(one_way_anova_power(0.25, [45, 45, 45]), 3)  # Cohen's medium effect
     0.732
     """
-    groups = numbers(sizes, "sizes")
+    groups = _within(sizes, "sizes", 0.0, MOST_PEOPLE)
     if groups.ndim < 1 or groups.shape[-1] < 2 or (groups < 1.0).any() or (groups.max(axis=-1) < 2.0).any():
         raise ValueError("sizes must be of at least two groups, each at least 1 and one of them at least 2")
     total, k = groups.sum(axis=-1), groups.shape[-1]
-    return _power(_at_least(f, "f", 0.0) ** 2 * total, np.asarray(k - 1.0), total - k, alpha)
+    return _power(_within(f, "f", 0.0, LARGEST_F) ** 2 * total, np.asarray(k - 1.0), total - k, alpha)
 
 
 def rm_anova_power(
@@ -68,21 +74,23 @@ def rm_anova_power(
     >>> int(n[(rm_anova_power(0.25, n, 3) >= 0.8).argmax()])  # as G*Power
     28
     """
-    n, k = _at_least(participants, "participants", 2.0), _at_least(conditions, "conditions", 2.0)
+    n, k = (
+        _within(participants, "participants", 2.0, MOST_PEOPLE),
+        _within(conditions, "conditions", 2.0, MOST_CONDITIONS),
+    )
     rho, e = numbers(correlation, "correlation"), numbers(epsilon, "epsilon")
     if ((rho <= -1.0 / (k - 1.0)) | (rho >= 1.0)).any():
         raise ValueError("correlation must lie between -1 / (conditions - 1) and 1")
     if ((e < (1.0 - 1e-12) / (k - 1.0)) | (e > 1.0)).any():
         raise ValueError("epsilon must lie in 1 / (conditions - 1) to 1")
-    noncentrality = _at_least(f, "f", 0.0) ** 2 * n * k * e / (1.0 - rho)
+    noncentrality = _within(f, "f", 0.0, LARGEST_F) ** 2 * n * k * e / (1.0 - rho)
     return _power(noncentrality, (k - 1.0) * e, (n - 1.0) * (k - 1.0) * e, alpha)
 
 
-def _at_least(values: ArrayLike, name: str, low: float, below: float = np.inf) -> FloatArray:
+def _within(values: ArrayLike, name: str, low: float, high: float) -> FloatArray:
     array = numbers(values, name)
-    if ((array < low) | (array >= below)).any():
-        rule = f"lie in {low:g} to {below:g}, which it does not reach" if np.isfinite(below) else f"be at least {low:g}"
-        raise ValueError(f"{name} must {rule}, not {values!r}")
+    if ((array < low) | (array > high)).any():
+        raise ValueError(f"{name} must be at least {low:g} and at most {high:,.0f}, not {quoted(values)}")
     return array
 
 
@@ -90,7 +98,7 @@ def _power(noncentrality: FloatArray, df_effect: FloatArray, df_error: FloatArra
     """P(F' > F_alpha); without an effect the level itself."""
     level = numbers(alpha, "alpha")
     if ((level <= 0.0) | (level >= 1.0)).any():
-        raise ValueError(f"alpha must lie between 0 and 1, not {alpha!r}")
+        raise ValueError(f"alpha must lie between 0 and 1, not {quoted(alpha)}")
     critical = special.fdtri(df_effect, df_error, 1.0 - level)
-    power = 1.0 - special.ncfdtr(df_effect, df_error, noncentrality, critical)
+    power = 1.0 - special.ncfdtr(df_effect, df_error, np.minimum(noncentrality, MOST_NONCENTRALITY), critical)
     return float_or_array(np.where(noncentrality > 0.0, power, level))

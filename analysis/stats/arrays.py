@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from decimal import Decimal
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from device.words import QUOTED
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -24,6 +27,15 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
     `ValueError` naming the place if a value is missing, infinite or not a number, or if rows differ in length. Numbers
     in text are not read: who wrote "7" may have meant a label.
     """
+    array = doubles(values, name)
+    if not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name} must be finite, {_at(place)} {array[place]}")
+    return array
+
+
+def doubles(values: ArrayLike, name: str) -> FloatArray:
+    """As `numbers`, but NaN and infinite ones may be among them."""
     if isinstance(values, np.ma.MaskedArray) and values.mask.any():
         place = tuple(int(i) for i in np.argwhere(values.mask)[0])
         raise ValueError(f"{name} must be complete, but the value at index {place} is masked")
@@ -38,13 +50,86 @@ def numbers(values: ArrayLike, name: str) -> FloatArray:
             f"{name} must be numbers in a full rectangle, {_first_stranger(array) or f'not {array.dtype}'}"
         )
     try:
-        array = array.astype(np.float64, copy=False)
+        return array.astype(np.float64, copy=False)
     except OverflowError:
         raise ValueError(f"{name} must be finite, but one is beyond the largest double") from None
-    if not np.isfinite(array).all():
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(f"{name} must be finite, but the value at index {place} is {array[place]}")
-    return array
+
+
+def _at(place: tuple[int, ...]) -> str:
+    return f"but the value at index {place} is" if place else "not"
+
+
+def single(value: ArrayLike, name: str) -> float:
+    """`value` as one finite number, else `ValueError` naming it.
+
+    >>> single(Fraction(1, 2), "p0")
+    0.5
+    """
+    array = numbers(value, name)
+    if array.ndim:
+        raise ValueError(f"{name} must be one number, not an array of shape {array.shape}")
+    return float(array)
+
+
+def whole(value: ArrayLike, name: str, low: int, high: float = math.inf) -> int:
+    """`value` as one whole number of `low` to `high`, else `ValueError` naming it."""
+    found = single(value, name)
+    if found != math.floor(found) or not low <= found <= high:
+        end = "" if math.isinf(high) else f" to {high:,.0f}"
+        raise ValueError(f"{name} must be a whole number from {low}{end}, not {quoted(value)}")
+    return int(found)
+
+
+_SMALLEST_SCALE, _LARGEST_SCALE = 1e-6, 1e6
+
+
+def scale_of(value: ArrayLike, name: str) -> float:
+    """`value` as one number of 0.000001 to 1,000,000, else `ValueError` naming it: the scale of a prior or a fence."""
+    found = single(value, name)
+    if not _SMALLEST_SCALE <= found <= _LARGEST_SCALE:
+        raise ValueError(f"{name} must be above 0, at least 0.000001, and at most 1,000,000, not {quoted(value)}")
+    return found
+
+
+def one_of(value: object, name: str, options: Sequence[str]) -> str:
+    """`value` if it is one of the words, else `ValueError` naming it and them."""
+    if not isinstance(value, str) or value not in options:
+        raise ValueError(f"{name} must be one of {', '.join(options)}, not {quoted(value)}")
+    return value
+
+
+def entries(values: object, name: str) -> list[Hashable]:
+    """What says of each row or condition whose or which it is: a list, an array or a column, with an order.
+
+    `ValueError` naming it: anything else, or an entry that is missing or itself a list.
+
+    >>> entries(("P1", "P2"), "people")
+    ['P1', 'P2']
+    """
+    if isinstance(values, str | bytes) or not (isinstance(values, Sequence) or getattr(values, "ndim", 0) == 1):
+        raise ValueError(f"{name} must be a list or column, not {quoted(values)}")
+    found = list(cast("Sequence[Hashable]", values))
+    for place, one in enumerate(found):
+        if not isinstance(one, Hashable) or _is_missing(one):
+            raise ValueError(f"{name} must be a list of names, but the one at index {place} is {quoted(one)}")
+    return found
+
+
+def _is_missing(value: object) -> bool:
+    """Whether it is None, NaN or one of pandas' own."""
+    try:
+        return value is None or bool(value != value)  # noqa: PLR0124 - NaN alone is not itself
+    except TypeError:  # pandas.NA is neither equal nor unequal
+        return True
+
+
+def quoted(value: object) -> str:
+    """A value as a message shows it: cut where it would hide the message."""
+    try:
+        text = repr(value)
+    except ValueError:  # whole numbers of more than some thousand digits have no text
+        return "a number beyond all doubles"
+    return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
 
 
 def _ragged(values: object) -> str:
@@ -58,7 +143,7 @@ def _first_stranger(array: NDArray[np.generic]) -> str:
     for place, value in np.ndenumerate(array):
         if not isinstance(value, Real | Decimal | np.bool_) or _signals(value):
             found = value.item() if isinstance(value, np.generic) else value
-            return f"but the value at index {place} is {found!r}" if place else f"not {found!r}"
+            return f"{_at(place)} {quoted(found)}"
     return ""
 
 
@@ -73,11 +158,12 @@ def float_or_array(values: ArrayLike) -> Values:
     return float(array) if array.ndim == 0 else array
 
 
-def share(value: float, name: str) -> float:
-    """`value` if it lies strictly between 0 and 1, else `ValueError`."""
-    if not 0.0 < value < 1.0:
-        raise ValueError(f"{name} must lie between 0 and 1, not {value}")
-    return value
+def share(value: ArrayLike, name: str) -> float:
+    """`value` if it lies strictly between 0 and 1, else `ValueError` naming it."""
+    found = single(value, name)
+    if not 0.0 < found < 1.0:
+        raise ValueError(f"{name} must lie between 0 and 1, not {quoted(value)}")
+    return found
 
 
 def together(**named: FloatArray) -> tuple[FloatArray, ...]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, by_case, float_or_array, numbers, share, together
+from analysis.stats.arrays import FloatArray, Values, by_case, float_or_array, numbers, one_of, share, together
 from analysis.stats.binomial_tail import LongArray, log_between, log_pmf, tail_over_pmf
 from analysis.stats.frames import Result
 
@@ -130,11 +130,7 @@ def _checked(successes: ArrayLike, trials: ArrayLike, p0: ArrayLike) -> tuple[Fl
 
 
 def _known(alternative: str) -> Tail:
-    for side in get_args(Tail):
-        if alternative == side:
-            known: Tail = side
-            return known
-    raise ValueError(f"alternative must be one of {', '.join(get_args(Tail))}, not {alternative!r}")
+    return cast("Tail", one_of(alternative, "alternative", get_args(Tail)))
 
 
 def _log_p(k: FloatArray, n: FloatArray, chance: FloatArray, side: Tail) -> LongArray:
@@ -293,8 +289,8 @@ def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, n
         false_alarms=numbers(false_alarms, "false_alarms"),
         noise_trials=numbers(noise_trials, "noise_trials"),
     )
-    hit_rate, z_hit = _rate_and_z(hits, signal_trials, "hits")
-    false_alarm_rate, z_false_alarm = _rate_and_z(false_alarms, noise_trials, "false_alarms")
+    hit_rate, z_hit = _rate_and_z(hits, signal_trials, "hits", "signal_trials")
+    false_alarm_rate, z_false_alarm = _rate_and_z(false_alarms, noise_trials, "false_alarms", "noise_trials")
     return Detection(
         d_prime=float_or_array(z_hit - z_false_alarm),
         criterion=float_or_array(-(z_hit + z_false_alarm) / 2.0),
@@ -303,14 +299,14 @@ def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, n
     )
 
 
-def _rate_and_z(counts: FloatArray, totals: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
+def _rate_and_z(counts: FloatArray, totals: FloatArray, name: str, of: str) -> tuple[FloatArray, FloatArray]:
     """The corrected rate and its normal quantile, taken from the nearer end so that 0 and all mirror exactly."""
     if (totals < 1.0).any():
-        raise ValueError(f"{name}: there must be at least 1 trial")
+        raise ValueError(f"{of} must be at least 1, not {totals[totals < 1.0][0]:g}")
     if ((counts < 0.0) | (counts > totals)).any():
-        raise ValueError(f"{name} must lie in 0..trials, not {counts[(counts < 0.0) | (counts > totals)][0]:g}")
+        raise ValueError(f"{name} must lie in 0..{of}, not {counts[(counts < 0.0) | (counts > totals)][0]:g}")
     if (counts != np.floor(counts)).any() or (totals != np.floor(totals)).any():
-        raise ValueError(f"{name} and their trials must be whole numbers, counts and not rates")
+        raise ValueError(f"{name} and {of} must be whole numbers, counts and not rates")
     rest = totals - counts
     z = special.ndtri((np.minimum(counts, rest) + 0.5) / (totals + 1.0))
     return (counts + 0.5) / (totals + 1.0), np.where(counts > rest, -z, z)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, numbers, one_of
 
 Correction = Literal["none", "holm", "benjamini-hochberg"]
 
@@ -50,7 +50,7 @@ def corrected(p: ArrayLike, correction: Correction) -> FloatArray:
     >>> corrected([0.01, 0.04], "holm").tolist(), corrected([0.01, 0.04], "none").tolist()
     ([0.02, 0.04], [0.01, 0.04])
     """
-    if correction == "none":
+    if one_of(correction, "correction", get_args(Correction)) == "none":
         return _p_values(p)
     return holm(p) if correction == "holm" else benjamini_hochberg(p)
 

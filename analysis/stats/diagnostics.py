@@ -12,7 +12,7 @@ from scipy import special, stats
 from scipy.optimize import brentq
 
 from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, one_table, rm_anova, scores_and_names
-from analysis.stats.arrays import FloatArray, pingouin, share
+from analysis.stats.arrays import FloatArray, pingouin, quoted, scale_of, share
 from analysis.stats.frames import Label, Result, Results, ScoreTable, named_scores
 from analysis.stats.sums_of_squares import repeated_sums
 
@@ -112,12 +112,13 @@ def outliers(scores: ScoreTable, reach: float = 1.5) -> Results[Outlier]:
     """The scores beyond `reach` interquartile ranges from the quartiles of their condition, conditions in order.
 
     `scores`: (n participants, k conditions). Quartiles interpolate linearly. A score within 1e-9 interquartile ranges
-    of a fence is inside: tenths are no doubles. Source: Tukey 1977, Exploratory Data Analysis, 2D.
+    of a fence is inside: tenths are no doubles. `ValueError` as in `rm_anova`, or a `reach` that is not above 0.
+    Source: Tukey 1977, Exploratory Data Analysis, 2D.
 
     >>> outliers([[1, 4], [2, 5], [2, 5], [3, 6], [30, 5]])[0].score
     30.0
     """
-    array = one_table(named_scores(scores, "scores")[0])
+    array, reach = one_table(check_scores(scores)), scale_of(reach, "reach")
     lower, upper = np.quantile(array, [0.25, 0.75], axis=0)
     spread = upper - lower
     slack = 1e-9 * np.maximum(spread, np.abs(array).max(axis=0))
@@ -269,6 +270,8 @@ def effect_size(anova: RepeatedMeasuresAnova) -> EffectSize:
     >>> round(found.partial_eta_squared, 3), tuple(round(end, 3) for end in found.ci_90)
     (0.812, (0.283, 0.871))
     """
+    if not isinstance(anova, RepeatedMeasuresAnova):
+        raise ValueError(f"anova must be what rm_anova gives, not {quoted(anova)}")
     if np.ndim(anova.F):
         raise ValueError(f"anova must be that of one data set, not of an array {np.shape(anova.F)} of them")
     F, partial, generalized = (

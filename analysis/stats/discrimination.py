@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from scipy import special
 from scipy.optimize import elementwise
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, one_of, whole
 from analysis.stats.frames import Result
 
 Task = Literal["two-interval", "abx", "oddity"]
@@ -58,11 +58,9 @@ _RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {
 }
 
 
-def _right(task: str) -> Callable[[FloatArray], FloatArray]:
-    for name, right in _RIGHT.items():
-        if name == task:
-            return right
-    raise ValueError(f"task must be one of {', '.join(_RIGHT)}, not {task!r}")
+def _right(task: Task) -> Callable[[FloatArray], FloatArray]:
+    one_of(task, "task", tuple(_RIGHT))
+    return _RIGHT[task]
 
 
 def share_right(d_prime: ArrayLike, task: Task) -> Values:
@@ -95,8 +93,8 @@ def discrimination(right: int, trials: int, task: Task) -> Discrimination:
     >>> round(float(discrimination(76, 100, "two-interval").d_prime), 3)
     0.999
     """
-    if not 0 <= right <= trials or trials < 1:
-        raise ValueError(f"right must lie in 0..trials and trials be at least 1, not {right} of {trials}")
+    trials = whole(trials, "trials", 1)
+    right = whole(right, "right", 0, trials)
     share_of, corrected = _right(task), right in (0, trials)
     share = (right + 0.5) / (trials + 1) if corrected else right / trials
     if share <= CHANCE[task]:

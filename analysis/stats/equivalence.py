@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.stats.anova import own_pairs
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, numbers, quoted, single
 from analysis.stats.frames import Result
 
 NO_VARIANCE = "There is no variance, so there is no test: the mean itself says on which side of the bounds it lies."
@@ -86,6 +86,8 @@ def tost_two_samples(
     (4.033, 0.0066)
     """
     first, second = _sample(a, "a"), _sample(b, "b")
+    if not isinstance(equal_variances, bool | np.bool_):
+        raise ValueError(f"equal_variances must be True or False, not {quoted(equal_variances)}")
     (mean_a, se_a), (mean_b, se_b) = _mean_and_se(first), _mean_and_se(second)
     degrees = first.size - 1.0, second.size - 1.0
     if equal_variances:
@@ -117,9 +119,10 @@ def _se(error: float) -> float:
 
 
 def _tests(mean_se_df: tuple[float, float, float], bounds: tuple[float, float], alpha: float) -> Equivalence:
-    (difference, se, df), (low, high) = mean_se_df, bounds
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ValueError(f"low must be below high, both finite, not {low} and {high}")
+    difference, se, df = mean_se_df
+    low, high, alpha = single(bounds[0], "low"), single(bounds[1], "high"), single(alpha, "alpha")
+    if low >= high:
+        raise ValueError(f"low must be below high, not {low} and {high}")
     if not 0.0 < alpha < 0.5:
         raise ValueError(f"alpha must lie between 0 and 0.5, not {alpha}")
     found = Equivalence(difference=difference, low=low, high=high, alpha=alpha)

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, by_row, numbers, share
+from analysis.stats.arrays import FloatArray, by_row, entries, numbers, one_of, quoted
 from analysis.stats.frames import Result, Results
 
 INTERCEPT = "intercept"
@@ -49,11 +49,12 @@ def indicators(levels: Sequence[str], reference: str | None = None) -> dict[str,
     >>> {name: column.tolist() for name, column in indicators(["a", "b", "c", "b"]).items()}
     {'b': [0.0, 1.0, 0.0, 1.0], 'c': [0.0, 0.0, 1.0, 0.0]}
     """
-    names = list(dict.fromkeys(map(str, levels)))
-    first = names[0] if reference is None else reference
-    if first not in names or len(names) < 2:
-        raise ValueError(f"two levels are needed, and the reference {first!r} among them; there are {', '.join(names)}")
-    given = np.array(list(map(str, levels)))
+    each = list(map(str, entries(levels, "levels")))
+    names = list(dict.fromkeys(each))
+    if len(names) < 2:
+        raise ValueError(f"levels: at least two are needed, not {quoted(names)}")
+    first = names[0] if reference is None else one_of(reference, "reference", names)
+    given = np.array(each)
     return {name: (given == name).astype(np.float64) for name in names if name != first}
 
 
@@ -63,11 +64,10 @@ def people_codes(people: Sequence[Hashable], rows: int) -> NDArray[np.intp]:
     >>> people_codes(["P2", "P1", "P2"], 3).tolist()
     [0, 1, 0]
     """
-    if len(people) != rows:
-        raise ValueError(f"people must say whose each row is: there are {len(people)} for {rows} rows")
-    codes: NDArray[np.intp] = pd.factorize(np.fromiter(people, dtype=object, count=rows))[0]
-    if (codes < 0).any():
-        raise ValueError(f"people must say whose each row is, but row {int(np.argmax(codes < 0))} is of nobody")
+    each = entries(people, "people")
+    if len(each) != rows:
+        raise ValueError(f"people must say whose each row is: there are {len(each)} for {rows} rows")
+    codes: NDArray[np.intp] = pd.factorize(np.fromiter(each, dtype=object, count=rows))[0]
     return codes
 
 
@@ -80,12 +80,14 @@ def _check_named(predictors: object) -> None:
 def columns_of(predictors: Mapping[str, ArrayLike], rows: int) -> PredictorColumns:
     """The columns of a model. `ValueError`: another number of rows, a constant predictor, predictors that overlap."""
     _check_named(predictors)
-    given = [numbers(values, f"predictor {name!r}") for name, values in predictors.items()]
+    given = [numbers(values, f"predictors[{name!r}]") for name, values in predictors.items()]
     for name, array in zip(predictors, given, strict=True):
         if array.shape != (rows,):
-            raise ValueError(f"predictor {name!r} must have one number for each of the {rows} rows, not {array.shape}")
+            raise ValueError(
+                f"predictors[{name!r}] must have one number for each of the {rows} rows, not {array.shape}"
+            )
         if array.min() == array.max():
-            raise ValueError(f"predictor {name!r} is {array[0]:g} in every row: it tells nothing from the intercept")
+            raise ValueError(f"predictors[{name!r}] is {array[0]:g} in every row: it tells nothing from the intercept")
     wide = np.column_stack([np.ones(rows), *given])
     means, spreads = wide.mean(axis=0), wide.std(axis=0)
     means[0], spreads[0] = 0.0, 1.0
@@ -101,7 +103,7 @@ def coefficients(
     names: Sequence[str], estimates: FloatArray, se: FloatArray, confidence: float
 ) -> Results[Coefficient]:
     """Wald tests and intervals of estimates (p,) with their standard errors (p,)."""
-    z, half = estimates / se, -float(special.ndtri((1.0 - share(confidence, "confidence")) / 2.0)) * se
+    z, half = estimates / se, -float(special.ndtri((1.0 - confidence) / 2.0)) * se
     rows = by_row(
         estimate=estimates,
         se=se,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.report.serial import NotebookResult, plain
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, numbers, quoted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,14 +27,18 @@ FROM_LONG = "a long table becomes a wide one by wide(table, participant=..., con
 def named_scores(scores: ScoreTable, name: str) -> tuple[FloatArray, tuple[Label, ...] | None]:
     """ScoreTable as an array (..., participants, conditions), and the names of the conditions, if they have any."""
     if is_frame(scores):
-        return np.stack(_columns(scores, name), axis=-1), _labels(scores.columns)
+        return _stacked(_columns(scores, name)), _labels(scores.columns)
     if isinstance(scores, Mapping):
         columns = [numbers(column, f"{name}[{key!r}]") for key, column in scores.items()]
         if len({column.shape for column in columns}) > 1:
             lengths = ", ".join(f"{key} {column.shape}" for key, column in zip(scores, columns, strict=True))
             raise ValueError(f"{name} must have as many participants in each condition, not {lengths}")
-        return np.stack(columns, axis=-1) if columns else np.empty((0, 0)), _labels(scores)
+        return _stacked(columns), _labels(scores)
     return numbers(scores, name), None
+
+
+def _stacked(columns: list[FloatArray]) -> FloatArray:
+    return np.stack(columns, axis=-1) if columns else np.empty((0, 0))
 
 
 def named_groups(groups: GroupTable, name: str) -> tuple[list[FloatArray], tuple[Label, ...] | None]:
@@ -43,8 +47,9 @@ def named_groups(groups: GroupTable, name: str) -> tuple[list[FloatArray], tuple
         return _columns(groups, name), _labels(groups.columns)
     if isinstance(groups, Mapping):
         return [numbers(group, f"{name}[{key!r}]") for key, group in groups.items()], _labels(groups)
-    if isinstance(groups, str) or not hasattr(groups, "__len__"):
-        raise ValueError(f"{name} must be a sequence or mapping of arrays, one a group, not {groups!r}")
+    listed = isinstance(groups, Sequence) and not isinstance(groups, str | bytes)
+    if not listed and getattr(groups, "ndim", 0) < 1:
+        raise ValueError(f"{name} must be a sequence or mapping of arrays, one a group, not {quoted(groups)}")
     return [numbers(cast("ArrayLike", group), f"{name}[{i}]") for i, group in enumerate(groups)], None
 
 
@@ -109,9 +114,11 @@ def groups_of(table: pd.DataFrame, *, group: str, score: str) -> dict[str, Float
 
 
 def _there(table: pd.DataFrame, **wanted: str) -> None:
+    if not is_frame(table):
+        raise ValueError(f"table must be a DataFrame, not {quoted(table)}")
     for argument, column in wanted.items():
-        if column not in table.columns:
-            raise ValueError(f"{argument}={column!r}: no such column; the table has {', '.join(map(str, table))}")
+        if not isinstance(column, str) or column not in table.columns:
+            raise ValueError(f"{argument}={quoted(column)}: no such column; the table has {', '.join(map(str, table))}")
 
 
 class Result(NotebookResult):

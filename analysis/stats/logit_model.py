@@ -52,17 +52,17 @@ def clustering(successes: ArrayLike, trials: ArrayLike, p0: float = 0.5) -> Clus
     >>> round(found.icc, 3), round(found.design_effect, 2), round(found.p_adjusted, 3)
     (0.335, 4.02, 0.668)
     """
-    y, m = numbers(successes, "successes"), numbers(trials, "trials")
-    if y.shape != m.shape or ((y < 0.0) | (y > m)).any():
-        raise ValueError("successes must lie in 0..trials, one of each a participant")
+    y, m, chance = numbers(successes, "successes"), numbers(trials, "trials"), share(p0, "p0")
+    if y.ndim != 1 or y.shape != m.shape or ((y < 0.0) | (y > m)).any():
+        raise ValueError("successes and trials must be one number a participant, successes in 0..trials")
     y, m = y[m > 0.0], m[m > 0.0]
     reason = _undefined(y, m)
     if reason is not None:
         return Clustering(reason=reason)
     icc = _icc(y, m)
     design_effect = 1.0 + (float((m**2).sum() / m.sum()) - 1.0) * icc
-    variance = max(design_effect, 1.0) * share(p0, "p0") * (1.0 - p0) / float(m.sum())
-    t = abs(float(y.sum() / m.sum()) - p0) / math.sqrt(variance)
+    variance = max(design_effect, 1.0) * chance * (1.0 - chance) / float(m.sum())
+    t = abs(float(y.sum() / m.sum()) - chance) / math.sqrt(variance)
     p = 2.0 * float(special.stdtr(m.size - 1, -t))
     return Clustering(icc=icc, design_effect=design_effect, p_adjusted=p)
 
@@ -170,11 +170,12 @@ def logit_model(
     ([('A', 0.4), ('B', 0.767)], 4.93)
     """
     (y, own), (n, _) = named_scores(successes, "successes"), named_scores(trials, "trials")
+    confidence = share(confidence, "confidence")
     if y.ndim != 2 or y.shape != n.shape or y.shape[1] < 2:
         raise ValueError(f"successes and trials must be people by at least 2 conditions, not {y.shape} and {n.shape}")
     labels = condition_names(own if labels is None else labels, y.shape[1])
     if (n < 1.0).any() or ((y < 0.0) | (y > n)).any():
-        raise ValueError("every cell needs a trial, and successes must lie in 0..trials")
+        raise ValueError("trials must be at least 1 in every cell, and successes lie in 0..trials")
     right, total = y.sum(axis=0), n.sum(axis=0)
     reason = _unfit(right, total, len(y), labels)
     if reason is not None:
@@ -251,4 +252,4 @@ def _equal_odds(log_odds: FloatArray, covariance: FloatArray, people: int) -> Eq
 
 
 def _critical(df: int, confidence: float) -> float:
-    return -float(special.stdtrit(df, (1.0 - share(confidence, "confidence")) / 2.0))
+    return -float(special.stdtrit(df, (1.0 - confidence) / 2.0))

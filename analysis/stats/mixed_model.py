@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, numbers, share
 from analysis.stats.fixed_effects import Coefficient, coefficients, columns_of, people_codes
 from analysis.stats.frames import Result
 
@@ -69,6 +69,7 @@ def linear_mixed_model(
         raise ValueError(f"values must be one number a trial, not of shape {array.shape}")
     columns = columns_of(predictors, array.size)
     codes = people_codes(people, array.size)
+    confidence = share(confidence, "confidence")
     empty = LinearMixedModel(people=len(np.unique(codes)), trials=array.size)
     middle, spread = float(array.mean()), float(np.abs(array - array.mean()).max())
     if empty.people < 2:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy import special, stats
 
 from analysis.stats.anova import check_scores, one_table, own_pairs, pairs_of, scores_and_names
-from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, share
+from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, scale_of, share, single, whole
 from analysis.stats.corrections import holm
 from analysis.stats.frames import Label, Result, Results, ScoreTable
 
@@ -29,14 +29,13 @@ def jzs_paired(t: float, n: int, r: float = SCALE) -> float | None:
     Under H1 the standardised mean difference has a Cauchy(0, r) prior, and the variance Jeffreys's; under H0 it is 0.
     Two-sided; integrated numerically by pingouin. None where BF10 exceeds the largest double (n = 1000, t = 100), and
     for |t| above 100: from t = 1000 on pingouin's integral misses its peak in silence (n = 7: 2e8 for 3e12).
-    `ValueError`: fewer than two differences, or a t that is not finite.
+    `ValueError`: fewer than two differences, a t that is not finite, or an r outside 1e-6 to 1e6.
     Source: Rouder, Speckman, Sun, Morey & Iverson 2009, Psychon. Bull. Rev. 16, 225, equation 1.
 
     >>> round(jzs_paired(3.5, 20), 3)
     17.185
     """
-    if n < 2 or not math.isfinite(t):
-        raise ValueError(f"at least 2 differences and a finite t are needed, not {n} and {t}")
+    t, n, r = single(t, "t"), whole(n, "n", 2), scale_of(r, "r")
     if abs(t) > LARGEST_T:
         return None
     try:

@@ -18,13 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 from scipy.optimize import linprog
 
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, numbers, share, whole
 from analysis.stats.fixed_effects import Coefficient, PredictorColumns, coefficients, columns_of, people_codes
 from analysis.stats.frames import Result
 from analysis.stats.logit_model import ONE_PERSON, ONE_TRIAL
 
 NODES = 25
 """As many as lme4 allows. Of people who differ by an SD above 3 (in log odds) they leave an error of 1 %; 99 do not."""
+MOST_NODES = 100
+"""What numpy has in full digits in less than a second."""
 LARGEST_SD = 10.0
 """Log odds that differ so much between people leave hardly anybody with answers of both kinds."""
 _STEPS, _CLOSE, _NEAR, _LONGEST = 100, 1e-8, 0.05, 2.0
@@ -95,7 +97,7 @@ def random_intercept_logit(
     `indicators` makes them of a factor. No estimate (`reason`): one person, one trial each, all answers alike,
     separation (predictors that tell right from wrong without exception), or people who differ without bound.
     `ValueError`: answers other than 0 and 1, lengths that differ, a trial of nobody, predictors that are constant or
-    overlap. Equals lme4's `glmer(..., family = binomial, nAGQ = 25)`.
+    overlap, `nodes` outside 1 to 100. Equals lme4's `glmer(..., family = binomial, nAGQ = 25)`.
     Sources: see the module; Albert & Anderson 1984, Biometrika 71, 1, for separation.
 
     >>> right = [1, 1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1]
@@ -107,11 +109,12 @@ def random_intercept_logit(
     answers = numbers(right, "right")
     if answers.ndim != 1 or not np.isin(answers, (0.0, 1.0)).all():
         raise ValueError("right must be one number a trial, 1 for right and 0 for wrong")
+    points = whole(nodes, "nodes", 1, MOST_NODES)
     columns = columns_of(predictors, answers.size)
     cells = _cells(columns.matrix, answers, people_codes(people, answers.size))
     reason = _unfit(cells, columns)
     empty = RandomInterceptLogit(people=cells.first.size, trials=answers.size, reason=reason)
-    return empty if reason else _fitted(empty, cells, columns, (confidence, nodes))
+    return empty if reason else _fitted(empty, cells, columns, (share(confidence, "confidence"), points))
 
 
 def _cells(matrix: FloatArray, right: FloatArray, person: NDArray[np.intp]) -> _Cells:

@@ -11,11 +11,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, together
+from analysis.stats.arrays import FloatArray, Values, doubles, float_or_array, together
 from analysis.stats.studentized_tail import log_tails
 
 LOWEST_X = -45.0
 """exp(-45) is a range that is smaller with a probability below 1e-19, for every k and df."""
+MOST_MEANS, NORMAL_FROM = 1e100, 1e100
+"""Larger k and df would be squared beyond all doubles; from there the error is a normal one in all digits."""
 STEPS = 120
 """Halving alone would end in so many steps; six to fifteen are usual."""
 
@@ -61,22 +63,15 @@ def studentized_range_isf(p: ArrayLike, k: ArrayLike, df: ArrayLike) -> Values:
 
 def _checked(**named: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The three arguments broadcast; the first, q or p, may be NaN or infinite, and so may df."""
-    arrays = {name: _read(value, name) for name, value in named.items()}
+    arrays = {name: doubles(value, name) for name, value in named.items()}
     means, freedom = arrays["k"], arrays["df"]
-    if not ((means >= 2.0) & (means < np.inf)).all():
-        wrong = means[~((means >= 2.0) & (means < np.inf))][0]
-        raise ValueError(f"k, the number of means, must be at least 2 and finite, not {wrong}")
+    if not ((means >= 2.0) & (means <= MOST_MEANS)).all():
+        wrong = means[~((means >= 2.0) & (means <= MOST_MEANS))][0]
+        raise ValueError(f"k, the number of means, must be at least 2 and at most {MOST_MEANS:g}, not {wrong}")
     if not (freedom > 0.0).all():
         raise ValueError(f"df must be above 0, not {freedom[~(freedom > 0.0)][0]}")
     first, means, freedom = together(**arrays)
-    return first, means, freedom
-
-
-def _read(value: ArrayLike, name: str) -> FloatArray:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be numbers in a full rectangle, not {value!r}") from error
+    return first, means, np.where(freedom > NORMAL_FROM, np.inf, freedom)
 
 
 def _logsf(q: FloatArray, k: FloatArray, df: FloatArray) -> FloatArray:
