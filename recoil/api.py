@@ -67,10 +67,12 @@ def run_synthetic(
     from experiments.clock import VirtualClock
     from experiments.run import RunRequest, run
     from experiments.screens.synthetic import synthetic_screen
-    from recoil.arguments import arguments_named, check_setup, path_of, texts_of
+    from recoil.arguments import arguments_named, check_setup, path_of, refusal, texts_of
 
     check_setup("setup", setup)
     codes, where = texts_of("participants", participants, "codes", "P01"), path_of("results", results)
+    if not codes:
+        raise refusal("participants", participants, "one code or more, such as ['P01']")
     requests = (RunRequest(setup=setup, participant_id=code, results=where, seed=seed) for code in codes)
     with arguments_named():
         return [run(request, synthetic_screen, VirtualClock()).place.table for request in requests]
@@ -96,11 +98,11 @@ def read_logs(*paths: str | Path, columns: str | Path | None = None, include_syn
     from analysis.logs.column_map import ColumnMap
     from analysis.logs.reading import read_logs as reading
     from experiments.config.door import ConfigError, load
-    from recoil.arguments import in_python, path_of, paths_of
+    from recoil.arguments import file_of, flag_of, in_python, paths_of
 
     found = paths_of("paths", paths)
-    mapping = None if columns is None else load(ColumnMap, path_of("columns", columns))
-    logs = reading(found, mapping=mapping, include_synthetic=include_synthetic)
+    mapping = None if columns is None else load(ColumnMap, file_of("columns", columns))
+    logs = reading(found, mapping=mapping, include_synthetic=flag_of("include_synthetic", include_synthetic))
     logs = replace(logs, problems=tuple(replace(one, message=in_python(one.message)) for one in logs.problems))
     if not logs.files:
         nothing = (f"{', '.join(map(str, paths))}: no logs of Recoil",)
@@ -137,11 +139,12 @@ def analyze(
     from analysis.summary.summary import summarize
     from device.words import few_of_each
     from experiments.config.door import load
-    from recoil.arguments import path_of
+    from recoil.arguments import file_of, flag_of
 
-    asked = load(Requests, path_of("requests", requests)) if requests is not None else None
+    asked = load(Requests, file_of("requests", requests)) if requests is not None else None
+    fitted = flag_of("fits", fits)
     logs = read_logs(*paths, columns=columns, include_synthetic=include_synthetic)
-    found = with_everybody(summarize(logs, fits=fits), logs)
+    found = with_everybody(summarize(logs, fits=fitted), logs)
     if asked is not None and requests is not None:
         found = replace(found, requested=answers_to(asked, Path(requests), replace(logs, apart=())))
     left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
@@ -186,7 +189,7 @@ def power(
     from experiments.design.streams import checked_seed
     from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, refusal, texts_of
 
-    if isinstance(target, bool) or not isinstance(target, int | float):
+    if isinstance(target, bool) or not isinstance(target, int | float) or not 0 < target < 1:
         raise refusal("target", target, "a number between 0 and 1, such as 0.8")
     request = PowerRequest(
         config=file_or_name("config", config),
@@ -194,7 +197,7 @@ def power(
         trials=numbers_of("trials", trials),
         effects=numbers_of("effects", effects),
         methods=texts_of("methods", methods, "names", "vibration"),
-        studies=count_of("studies", studies, "10_000"),
+        studies=count_of("studies", studies, 10_000_000),
         target=target,
         seed=checked_seed(seed),
     )

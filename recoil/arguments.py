@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
@@ -11,8 +11,9 @@ from pathlib import Path
 from device.words import RecoilError
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
+from experiments.load import find
 
-_LONGEST = 80
+_LONGEST, _LONGEST_NAME = 80, 255
 _OF_OPTIONS = {"include-synthetic": "include_synthetic=True", "effect": "effects"}
 """What options are called in Python, where it is not the same."""
 _OPTION = re.compile(r"--([a-z][a-z-]*)( \S+:)?")
@@ -24,7 +25,10 @@ def refusal(name: str, value: object, must: str) -> ConfigError:
     >>> str(refusal("target", "high", "a number, such as 0.8"))
     "target = 'high': must be a number, such as 0.8"
     """
-    shown = repr(value)
+    try:
+        shown = repr(value)
+    except ValueError:  # whole numbers of more than some thousand digits have no text
+        shown = "a number of thousands of digits"
     return ConfigError(f"{name} = {shown if len(shown) <= _LONGEST else shown[:_LONGEST] + '...'}: must be {must}")
 
 
@@ -32,21 +36,44 @@ def file_or_name(name: str, value: object) -> str:
     """A file, or the name of a shipped config."""
     if not isinstance(value, str | Path) or not str(value):
         raise refusal(name, value, "a file or the name of a shipped config, such as 'direction'")
+    try:
+        find(str(value))
+    except OSError as error:
+        raise refusal(name, value, f"a file ({error.strerror})") from error
+    except ConfigError as error:
+        raise ConfigError(f"{name} = {error}") from None
     return str(value)
 
 
 def path_of(name: str, value: object) -> Path:
-    """A file or folder."""
+    """A file or folder, there or to be made."""
     if not isinstance(value, str | Path) or not str(value):
         raise refusal(name, value, "a path, such as 'results'")
+    if "\0" in str(value) or any(len(part) > _LONGEST_NAME for part in Path(value).parts):
+        raise refusal(name, value, "a path that a disk takes")
     return Path(value)
+
+
+def file_of(name: str, value: object) -> Path:
+    """A file that is there."""
+    path = path_of(name, value)
+    if not path.is_file():
+        raise refusal(name, str(value), "a file that is there")
+    return path
+
+
+def flag_of(name: str, value: object) -> bool:
+    """True or False."""
+    if not isinstance(value, bool):
+        raise refusal(name, value, "True or False")
+    return value
 
 
 def paths_of(name: str, values: Sequence[object]) -> tuple[Path, ...]:
     """One or more files or folders."""
     if not values or not all(isinstance(path, str | Path) and str(path) for path in values):
         raise refusal(name, values, "files or folders with logs, one argument each")
-    return tuple(Path(str(path)) for path in values)
+    return tuple(path_of(name, path) for path in values)
 
 
 def check_setup(name: str, value: object) -> None:
@@ -57,7 +84,7 @@ def check_setup(name: str, value: object) -> None:
 
 def texts_of(name: str, values: object, what: str, example: str) -> tuple[str, ...]:
     """A list of texts; one text alone is none."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
+    if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
         shown = values if isinstance(values, str) and values else example
         raise refusal(name, values, f"a list of {what}, such as [{shown!r}]")
     found = tuple(values)
@@ -68,17 +95,17 @@ def texts_of(name: str, values: object, what: str, example: str) -> tuple[str, .
 
 def numbers_of(name: str, values: object) -> str | None:
     """Numbers as the command line takes them; `None` for none."""
-    if isinstance(values, bool) or not isinstance(values, str | Real | Iterable):
+    if isinstance(values, bool | bytes | Mapping) or not isinstance(values, str | Real | Iterable):
         raise refusal(name, values, "a number, a list of numbers, or text such as '8,10,14-20'")
     if isinstance(values, str | Real):
         return str(values)
     return ",".join(map(str, values)) or None
 
 
-def count_of(name: str, value: object, example: str) -> int:
+def count_of(name: str, value: object, most: int) -> int:
     """A whole number from 1."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise refusal(name, value, f"a whole number from 1, such as {example}")
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise refusal(name, value, f"a whole number from 1 to {most:,}")
     return value
 
 

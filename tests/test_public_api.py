@@ -131,7 +131,7 @@ def test_what_found_is_shown_in_a_notebook() -> None:
         (lambda _, __: recoil.power("preference", methods="ramp"), "methods = 'ramp': must be a list of names"),
         (lambda _, __: recoil.power("preference", methods=["x"]), "methods = x: must be two or more"),
         (lambda _, __: recoil.power("preference", target="x"), "target = 'x': must be a number between 0 and 1"),
-        (lambda _, __: recoil.power("preference", target=2), "target = 2: must lie between 0 and 1"),
+        (lambda _, __: recoil.power("preference", target=2), "target = 2: must be a number between 0 and 1"),
     ],
 )
 def test_what_cannot_be_is_one_message_and_leaves_nothing(call: Any, said: str, tmp_path: Path) -> None:

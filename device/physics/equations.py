@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from device.parameters import GunParameters
+from device.words import cut_values
 
 ORDER = 24
 """Of the Taylor series. Measured: orders 20 to 28 take the same time within 15 %, 24 the least."""
@@ -185,6 +186,6 @@ def pack(gun: GunParameters, model: int = FULL) -> Constants:
 
 def model_number(fidelity: str) -> int:
     """The number of a model. `ValueError`: there is no such one."""
-    if fidelity not in MODELS:
-        raise ValueError(f"fidelity is {fidelity!r}; it must be one of {', '.join(FIDELITIES)}")
+    if not isinstance(fidelity, str) or fidelity not in MODELS:
+        raise ValueError(cut_values(f"fidelity is {fidelity!r}; it must be one of {', '.join(FIDELITIES)}"))
     return MODELS[fidelity]
