@@ -78,7 +78,10 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
         ({"method": {"levels": ["asymmetric-3"]}}, "no method 'asymmetric-3'; it has vibration"),
         ({"method": STRONG, "voltage_V": {"levels": [25.0]}}, "voltage_V"),
         ({"method": STRONG, "pulse_s": {"levels": [0.5]}}, "pulse_s"),
-        ({"method": STRONG, "voltage_V": {"levels": [0.5]}}, "below_break_away"),
+        (
+            {"method": STRONG, "voltage_V": {"levels": [0.5]}},
+            "write `below_break_away = true` on top of the design's file, above its first [table]",
+        ),
         ({"method": STRONG, "tension_V": {"levels": [1.0]}}, "factors.tension_V: the gun has no such number"),
         (
             {"method": {"levels": ["vibration"]}, "voltage_V": {"levels": [12.0]}},
