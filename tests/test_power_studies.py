@@ -27,6 +27,7 @@ from analysis.predict.power.planned import (
     precisions,
     shares,
     tallied,
+    textbook_power,
 )
 from analysis.predict.synthetic_studies import (
     direction_counts,
@@ -208,17 +209,38 @@ def test_without_backward_trials_there_is_no_d_prime() -> None:
 def test_tallies_add_up_in_any_order() -> None:
     flags = draws().random((2, 1000)) < 0.3
     widths = draws(2).random(1000)
-    whole = tallied(Findings(claims={"a": flags[0], "b": flags[1]}, half_widths={"w": widths}))
-    parts = [
-        tallied(Findings(claims={"a": flags[0, s], "b": flags[1, s]}, half_widths={"w": widths[s]}))
-        for s in (slice(0, 400), slice(400, 401), slice(401, 1000))
-    ]
+    squares = draws(3).random((2, 1000))
+
+    def tally(s: slice) -> Tally:
+        return tallied(
+            Findings(
+                claims={"a": flags[0, s], "b": flags[1, s]},
+                half_widths={"w": widths[s]},
+                mean_squares=squares[:, s],
+            )
+        )
+
+    whole = tally(slice(0, 1000))
+    parts = [tally(s) for s in (slice(0, 400), slice(400, 401), slice(401, 1000))]
     assert merged(parts) == merged(parts[::-1])
     assert merged(parts).held == whole.held
+    assert merged(parts).mean_squares == pytest.approx(whole.mean_squares)
     row = precisions(merged(parts))[0]
     assert (row.half_width, row.mc_error) == pytest.approx((widths.mean(), widths.std(ddof=1) / np.sqrt(1000)))
     with pytest.raises(ValueError, match="different claims"):
         merged([whole, Tally(studies=1, held={"a": 1}, sums={})])
+
+
+def test_the_power_from_f_is_the_simulated_one_of_normal_scores() -> None:
+    """Means 0, 0.5 and 1 with an error of 1: f^2 = 14 * 0.5 / (14 * 3), whatever sets people apart."""
+    people = 3.0 * draws(4).normal(size=(4_000, 14, 1))
+    scores = people + draws(5).normal(size=(4_000, 14, 3)) + np.array([0.0, 0.5, 1.0])
+    tally = tallied(analysed_ratings(scores, METHODS, [0.0, 0.5, 1.0]))
+    found = textbook_power(tally, 14, 3)
+    assert found is not None
+    assert found.f == pytest.approx(np.sqrt(0.5 / 3.0), rel=0.03)
+    assert found.power == pytest.approx(tally.held["ANOVA"] / 4_000, abs=0.03)
+    assert textbook_power(tallied(analysed_ratings(np.zeros((2, 5, 3)), METHODS, [0.0, 0.5, 1.0])), 5, 3) is None
 
 
 # agreement

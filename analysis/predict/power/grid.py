@@ -379,4 +379,4 @@ def _with_published(found: Findings, answers: Counts | FloatArray, trials: tuple
         return found
     claims = with_whole_pattern(published_claims(answers, trials, chunk.design.methods, chunk.published))
     named = {f"{PUBLISHED}, {claim}": held for claim, held in claims.items()}
-    return Findings(claims=dict(found.claims) | named, half_widths=found.half_widths)
+    return replace(found, claims=dict(found.claims) | named)

@@ -23,6 +23,11 @@ One = TypeVar("One")
 
 HEADLINES = (ANOVA, ALL_PAIRS, PATTERN)
 """What is told first, where there is room for little."""
+TEXTBOOK = (
+    "The row of the noncentral F is the textbook's power of the ANOVA (Cohen 1988), beside the simulated one above it: "
+    "from f, that of the partial eta squared of these studies, for scores that are normal and spherical. Where the two "
+    "differ, floors, ceilings or unequal spreads make the difference."
+)
 MOST_TABLES = 12
 """A page of more tables is read by nobody; `power.json` holds all."""
 
@@ -105,6 +110,7 @@ def _power(found: Power, figures: Path) -> Iterator[Section]:
         title="Power",
         paragraphs=(
             "Each share is of simulated studies; the bands are its 95 % interval; power.json has them all.",
+            TEXTBOOK,
             *cut,
         ),
         pictures=tuple(_pictures(found, figures)),
@@ -177,6 +183,7 @@ def _pattern(studies: int, pattern: PublishedPattern) -> Section:
 def _power_table(group: Sequence[DesignPower]) -> Table:
     names = [name for name in _claims(group) if _is_aim(name)]
     rows = [(claim_name(name), *(_percent(one.share_of(name)) for one in group)) for name in names]
+    rows.insert(names.index(ANOVA) + 1, ("ANOVA, noncentral F (f)", *(_from_f(one) for one in group)))
     widest = max((share.ci_high - share.ci_low) / 2.0 for one in group for share in one.claims)
     caption = f"Power in % of studies, 95 % intervals at most ±{apa.number(100.0 * widest, 1)}: {_setting(group[0])}"
     return _table(caption, "Significant", rows, group)
@@ -202,6 +209,12 @@ def _table(caption: str, corner: str, rows: Sequence[tuple[str, ...]], group: Se
 
 def _percent(share: ShareOfStudies | None) -> str:
     return apa.NO_NUMBER if share is None else apa.number(100.0 * share.share, 1)
+
+
+def _from_f(design: DesignPower) -> str:
+    """The textbook's power in percent with its effect size."""
+    found = design.textbook
+    return apa.NO_NUMBER if found is None else f"{apa.number(100.0 * found.power, 1)} ({apa.number(found.f, 2)})"
 
 
 def _half_width(design: DesignPower, measure: str) -> str:

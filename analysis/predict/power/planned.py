@@ -17,6 +17,7 @@ from scipy import special
 
 from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
 from analysis.stats.anova import check_scores, pairs_of, pooled_pairs, rm_anova
+from analysis.stats.anova_power import rm_anova_power
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test_p, yes_no
 from analysis.stats.studentized_range import studentized_range_isf
@@ -29,10 +30,14 @@ ANY_PAIR = "Tukey, any pair"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
-    """Of each study: which claims came out significant, and half the length of its 95 % intervals."""
+    """Of each study: which claims came out significant, half the length of its 95 % intervals, and its mean squares.
+
+    `mean_squares` (2, studies): of the methods and of the error of the ANOVA.
+    """
 
     claims: dict[str, Recurrence]
     half_widths: dict[str, FloatArray]
+    mean_squares: FloatArray
 
 
 def analysed_ratings(scores: ArrayLike, methods: Sequence[str], expected: Sequence[float]) -> Findings:
@@ -46,7 +51,8 @@ def analysed_ratings(scores: ArrayLike, methods: Sequence[str], expected: Sequen
     pairs = pooled_pairs(checked)
     critical = _critical(pairs.k, pairs.df)
     differs = pairs.q > critical
-    claims = {ANOVA: np.asarray(np.asarray(rm_anova(checked).p) < SIGNIFICANT)}
+    anova = rm_anova(checked)
+    claims = {ANOVA: np.asarray(np.asarray(anova.p) < SIGNIFICANT)}
     ordered = []
     for i, (a, b) in enumerate(pairs_of(pairs.k)):
         name, sign = _pair(methods, expected, a, b)
@@ -60,6 +66,7 @@ def analysed_ratings(scores: ArrayLike, methods: Sequence[str], expected: Sequen
         claims=claims,
         half_widths={"difference of two methods": critical * pairs.error[..., 0]}
         | {f"mean, {name}": half for name, half in zip(methods, _half_widths(checked), strict=True)},
+        mean_squares=np.stack([np.asarray(anova.ss_effect) / anova.df_effect, np.asarray(anova.ms_error)]),
     )
 
 
@@ -86,7 +93,7 @@ def analysed_directions(
             reached = np.abs(means[..., i]) > halves[i]
             claims[f"d′, {method}"] = reached & (sign * means[..., i] > 0.0) if sign else reached
             half_widths[f"d′, {method}"] = halves[i]
-    return Findings(claims=claims, half_widths=half_widths)
+    return Findings(claims=claims, half_widths=half_widths, mean_squares=found.mean_squares)
 
 
 def _pair(methods: Sequence[str], expected: Sequence[float], a: int, b: int) -> tuple[str, int]:
@@ -133,11 +140,41 @@ def _rejected(trials: int) -> Recurrence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tally:
-    """What is kept of a chunk of studies: in how many a claim held; sum and sum of squares of each half-width."""
+    """What is kept of a chunk of studies: in how many a claim held; sum and sum of squares of each half-width.
+
+    `mean_squares`: the sums over studies of those of the methods and of the error.
+    """
 
     studies: int
     held: Mapping[str, int]
     sums: Mapping[str, tuple[float, float]]
+    mean_squares: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextbookPower:
+    """Power of the ANOVA by the noncentral F distribution, from Cohen's `f` of the simulated people."""
+
+    f: float
+    power: float
+
+
+def textbook_power(tally: Tally, participants: int, methods: int) -> TextbookPower | None:
+    """What a textbook would say beside the simulated power of the ANOVA; None where the scores have no error.
+
+    f^2 = (k - 1)(MS_methods / MS_error - 1) / (n k), the mean squares in their mean over studies, 0 where that is
+    negative: the f of a partial eta squared, as `cohens_f` has it. The scores are taken as normal and spherical.
+
+    >>> found = textbook_power(Tally(studies=1, held={}, sums={}, mean_squares=(8.0, 1.0)), 14, 3)
+    >>> round(found.f, 3), round(found.power, 3)
+    (0.577, 0.895)
+    """
+    of_methods, of_error = tally.mean_squares
+    if not of_error > 0.0:
+        return None
+    f = math.sqrt(max((methods - 1) * (of_methods / of_error - 1.0) / (participants * methods), 0.0))
+    power = float(rm_anova_power(f, participants, methods, correlation=0.0, alpha=SIGNIFICANT))
+    return TextbookPower(f=f, power=power)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +190,9 @@ def tallied(findings: Findings) -> Tally:
     """The tally of studies (one leading axis)."""
     held = {claim: int(flags.sum()) for claim, flags in findings.claims.items()}
     sums = {name: (float(w.sum()), float(np.square(w).sum())) for name, w in findings.half_widths.items()}
-    return Tally(studies=len(next(iter(findings.claims.values()))), held=held, sums=sums)
+    of_methods, of_error = findings.mean_squares.sum(axis=-1).tolist()
+    studies = len(next(iter(findings.claims.values())))
+    return Tally(studies=studies, held=held, sums=sums, mean_squares=(of_methods, of_error))
 
 
 def merged(tallies: Sequence[Tally]) -> Tally:
@@ -168,6 +207,10 @@ def merged(tallies: Sequence[Tally]) -> Tally:
             name: (math.fsum(one.sums[name][0] for one in tallies), math.fsum(one.sums[name][1] for one in tallies))
             for name in first.sums
         },
+        mean_squares=(
+            math.fsum(one.mean_squares[0] for one in tallies),
+            math.fsum(one.mean_squares[1] for one in tallies),
+        ),
     )
 
 

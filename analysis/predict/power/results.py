@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 
 from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, ShareOfStudies
 from analysis.predict.power.grid import PUBLISHED, Grid, GridCell, StudyDesign
-from analysis.predict.power.planned import Precision, Tally, merged, precisions, shares
+from analysis.predict.power.planned import Precision, Tally, TextbookPower, merged, precisions, shares, textbook_power
 from analysis.report.serial import NotebookResult, beside, plain
 from experiments.record.provenance import provenance
 
@@ -16,13 +16,17 @@ PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignPower(StudyDesign):
-    """A design, what it costs, and what studies of it found; `too_long` says why it keeps a participant too long."""
+    """A design, what it costs, and what studies of it found; `too_long` says why it keeps a participant too long.
+
+    `textbook`: the power of the ANOVA from its effect size, beside the simulated one.
+    """
 
     duration_s: float
     lab_hours: float
     too_long: str
     claims: tuple[ShareOfStudies, ...]
     precision: tuple[Precision, ...]
+    textbook: TextbookPower | None
 
     def share_of(self, claim: str) -> ShareOfStudies | None:
         """The share of studies in which a claim held; `None` if it is none of this design's."""
@@ -118,6 +122,7 @@ def _design(cell: GridCell, tally: Tally) -> DesignPower:
         too_long=cell.too_long,
         claims=shares(tally),
         precision=precisions(tally),
+        textbook=textbook_power(tally, cell.design.participants, len(cell.design.methods)),
     )
 
 

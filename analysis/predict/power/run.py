@@ -102,10 +102,14 @@ def _kept(path: Path) -> Iterator[tuple[int, Tally]]:
     if not path.exists():
         return
     for line in path.read_bytes().splitlines():
-        with contextlib.suppress(ValueError):
+        with contextlib.suppress(ValueError, KeyError):
             number, kept = json.loads(line)
             sums = {name: (total, squares) for name, (total, squares) in kept["sums"].items()}
-            yield number, Tally(studies=kept["studies"], held=kept["held"], sums=sums)
+            of_methods, of_error = kept["mean_squares"]
+            yield (
+                number,
+                Tally(studies=kept["studies"], held=kept["held"], sums=sums, mean_squares=(of_methods, of_error)),
+            )
 
 
 def _name(chunk: Chunk) -> str:
