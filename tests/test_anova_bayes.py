@@ -91,5 +91,5 @@ def test_without_an_error_there_is_none():
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, math.inf, math.nan])
 def test_a_scale_that_is_none_is_refused(scale):
-    with pytest.raises(ValueError, match="fixed_scale must be above 0"):
+    with pytest.raises(ValueError, match="fixed_scale must be"):
         rm_anova_bayes_factor(SCORES, scale)

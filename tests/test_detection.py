@@ -68,7 +68,7 @@ def test_participants_go_in_as_arrays() -> None:
     [
         ((11, 10, 0, 10), "hits"),
         ((1, 10, -1, 10), "false_alarms"),
-        ((0, 0, 0, 10), "at least 1 trial"),
+        ((0, 0, 0, 10), "signal_trials must be at least 1, not 0"),
         ((0.8, 10, 0, 10), "whole"),
     ],
 )

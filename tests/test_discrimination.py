@@ -62,5 +62,7 @@ def test_two_intervals_have_the_textbooks_d_prime_and_its_error():
 
 @pytest.mark.parametrize(("right", "trials"), [(-1, 10), (11, 10), (0, 0)])
 def test_what_no_count_is_is_refused(right, trials):
-    with pytest.raises(ValueError, match="right must lie"):
+    with pytest.raises(
+        ValueError, match=r"right must be a whole number from 0 to 10|trials must be a whole number from 1"
+    ):
         discrimination(right, trials, "oddity")

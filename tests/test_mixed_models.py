@@ -110,9 +110,9 @@ def test_what_cannot_be_fitted_says_why(right, people, reason):
     [
         ([1, 0, 2], "aab", {}, "1 for right and 0 for wrong"),
         ([1, 0], "aab", {}, "there are 3 for 2 rows"),
-        ([1, 0, 1], ["a", None, "b"], {}, "row 1 is of nobody"),
-        ([1, 0, 1], "aab", {"x": [1, 2]}, "'x' must have one number for each of the 3 rows"),
-        ([1, 0, 1], "aab", {"x": [2, 2, 2]}, "'x' is 2 in every row"),
+        ([1, 0, 1], ["a", None, "b"], {}, "the one at index 1 is None"),
+        ([1, 0, 1], "aab", {"x": [1, 2]}, r"predictors\['x'\] must have one number for each of the 3 rows"),
+        ([1, 0, 1], "aab", {"x": [2, 2, 2]}, r"predictors\['x'\] is 2 in every row"),
         ([1, 0, 1], "aab", {"x": [1, 2, 3], "y": [2, 4, 6]}, "x, y overlap"),
     ],
 )
@@ -122,7 +122,7 @@ def test_what_is_no_table_of_trials_is_refused(right, people, predictors, said):
 
 
 def test_a_reference_that_does_not_occur_is_refused():
-    with pytest.raises(ValueError, match=r"the reference 'c' among them; there are a, b"):
+    with pytest.raises(ValueError, match=r"reference must be one of a, b, not 'c'"):
         indicators(["a", "b"], "c")
 
 

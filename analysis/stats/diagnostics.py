@@ -112,13 +112,15 @@ def outliers(scores: ScoreTable, reach: float = 1.5) -> Results[Outlier]:
     """The scores beyond `reach` interquartile ranges from the quartiles of their condition, conditions in order.
 
     `scores`: (n participants, k conditions). Quartiles interpolate linearly. A score within 1e-9 interquartile ranges
-    of a fence is inside: tenths are no doubles. `ValueError` as in `rm_anova`, or a `reach` that is not above 0.
+    of a fence is inside: tenths are no doubles. `ValueError`: no finite scores, or a `reach` that is not above 0.
     Source: Tukey 1977, Exploratory Data Analysis, 2D.
 
     >>> outliers([[1, 4], [2, 5], [2, 5], [3, 6], [30, 5]])[0].score
     30.0
     """
-    array, reach = one_table(check_scores(scores)), scale_of(reach, "reach")
+    array, reach = one_table(named_scores(scores, "scores")[0]), scale_of(reach, "reach")
+    if not array.size:
+        raise ValueError(f"scores must be of at least 1 participant and 1 condition, not of shape {array.shape}")
     lower, upper = np.quantile(array, [0.25, 0.75], axis=0)
     spread = upper - lower
     slack = 1e-9 * np.maximum(spread, np.abs(array).max(axis=0))

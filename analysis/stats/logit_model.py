@@ -54,7 +54,7 @@ def clustering(successes: ArrayLike, trials: ArrayLike, p0: float = 0.5) -> Clus
     """
     y, m, chance = numbers(successes, "successes"), numbers(trials, "trials"), share(p0, "p0")
     if y.ndim != 1 or y.shape != m.shape or ((y < 0.0) | (y > m)).any():
-        raise ValueError("successes and trials must be one number a participant, successes in 0..trials")
+        raise ValueError("successes must lie in 0..trials, one of each a participant")
     y, m = y[m > 0.0], m[m > 0.0]
     reason = _undefined(y, m)
     if reason is not None:
