@@ -240,8 +240,8 @@ def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> Condi
         raise _beyond(
             design,
             levels,
-            "no shot of it ever moves the magnet, by the model; raise the voltage or the pulse; or, if that is what you "
-            "study, write `below_break_away = true` on top of the design's file, above its first [table]",
+            "no shot of it ever moves the magnet, by the model; raise the voltage or the pulse; or, if that is what "
+            "you study, write `below_break_away = true` on top of the design's file, above its first [table]",
         )
     return ConditionLimits(
         levels=levels, drive=shot.drive, load=rendering.load, status=rendering.motion, settle_s=rendering.settle_s
