@@ -62,7 +62,7 @@ def _at(place: tuple[int, ...]) -> str:
 def single(value: ArrayLike, name: str) -> float:
     """`value` as one finite number, else `ValueError` naming it.
 
-    >>> single(Fraction(1, 2), "p0")
+    >>> single(Decimal("0.5"), "p0")
     0.5
     """
     array = numbers(value, name)
