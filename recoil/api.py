@@ -187,10 +187,8 @@ def power(
     from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.run import simulated_power
     from experiments.design.streams import checked_seed
-    from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, refusal, texts_of
+    from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, share_of, texts_of
 
-    if isinstance(target, bool) or not isinstance(target, int | float) or not 0 < target < 1:
-        raise refusal("target", target, "a number between 0 and 1, such as 0.8")
     request = PowerRequest(
         config=file_or_name("config", config),
         participants=numbers_of("participants", participants),
@@ -198,7 +196,7 @@ def power(
         effects=numbers_of("effects", effects),
         methods=texts_of("methods", methods, "names", "vibration"),
         studies=count_of("studies", studies, 10_000_000),
-        target=target,
+        target=share_of("target", target),
         seed=checked_seed(seed),
     )
     with arguments_named():

@@ -109,6 +109,13 @@ def count_of(name: str, value: object, most: int) -> int:
     return value
 
 
+def share_of(name: str, value: object) -> float:
+    """A number between 0 and 1."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1:
+        raise refusal(name, value, "a number between 0 and 1, such as 0.8")
+    return value
+
+
 def in_python(message: str) -> str:
     """A message whose options are called as the arguments are.
 

@@ -110,17 +110,19 @@ def entries(values: object, name: str) -> list[Hashable]:
         raise ValueError(f"{name} must be a list or column, not {quoted(values)}")
     found = list(cast("Sequence[Hashable]", values))
     for place, one in enumerate(found):
-        if not isinstance(one, Hashable) or _is_missing(one):
+        if not _is_name(one):
             raise ValueError(f"{name} must be a list of names, but the one at index {place} is {quoted(one)}")
     return found
 
 
-def _is_missing(value: object) -> bool:
-    """Whether it is None, NaN or one of pandas' own."""
+def _is_name(value: object) -> bool:
+    """Whether it can tell one from another: no list, None, NaN or missing value of pandas."""
+    if value is None or not isinstance(value, Hashable):
+        return False
     try:
-        return value is None or bool(value != value)  # noqa: PLR0124 - NaN alone is not itself
+        return bool(value == value)  # noqa: PLR0124 - NaN alone is not itself
     except TypeError:  # pandas.NA is neither equal nor unequal
-        return True
+        return False
 
 
 def quoted(value: object) -> str:

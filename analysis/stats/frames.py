@@ -113,7 +113,7 @@ def groups_of(table: pd.DataFrame, *, group: str, score: str) -> dict[str, Float
     return {str(name): numbers(scores.to_numpy(), f"table[{score!r}] of {name!r}") for name, scores in rows}
 
 
-def _there(table: pd.DataFrame, **wanted: str) -> None:
+def _there(table: pd.DataFrame, **wanted: object) -> None:
     if not is_frame(table):
         raise ValueError(f"table must be a DataFrame, not {quoted(table)}")
     for argument, column in wanted.items():

@@ -184,7 +184,7 @@ def pack(gun: GunParameters, model: int = FULL) -> Constants:
     )
 
 
-def model_number(fidelity: str) -> int:
+def model_number(fidelity: object) -> int:
     """The number of a model. `ValueError`: there is no such one."""
     if not isinstance(fidelity, str) or fidelity not in MODELS:
         raise ValueError(cut_values(f"fidelity is {fidelity!r}; it must be one of {', '.join(FIDELITIES)}"))
