@@ -19,7 +19,7 @@ import pytest
 from hypothesis import settings
 
 from experiments.load import shipped_folder
-from tests import pdfs, warm_start
+from tests import figure_files, warm_start
 from tests.waiting import PATIENCE_S
 
 gc.disable()  # what is collected here stays: six thousand tests and all that they import, gone through again and again
@@ -62,16 +62,16 @@ Recoil = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture
 def recoil(tmp_path: Path) -> Recoil:
-    """The command, called in an empty folder with an empty home."""
+    """The command, called in an empty folder with an empty home; `NAME="value"` is put into its environment."""
     home = tmp_path / "home"
     home.mkdir()
     environment = {key: value for key, value in os.environ.items() if key in ("PATH", "LANG", "LC_ALL", "TMPDIR")}
 
-    def call(*words: object) -> subprocess.CompletedProcess[str]:
+    def call(*words: object, **variables: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
             warm_start.warm(*words),
             cwd=tmp_path,
-            env=environment | {"HOME": str(home)},
+            env=environment | {"HOME": str(home)} | variables,
             capture_output=True,
             text=True,
             check=False,
@@ -82,9 +82,9 @@ def recoil(tmp_path: Path) -> Recoil:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _no_pdfs() -> None:
-    """But where a test asks for them (`pdfs.drawn`)."""
-    pdfs.leave_out()
+def _png_alone() -> None:
+    """Of each figure, but where a test asks for more (`figure_files.drawn`)."""
+    figure_files.leave_out()
 
 
 @pytest.fixture(scope="session")

@@ -222,7 +222,6 @@ def test_simulate_tells_of_a_shot_and_draws_it(recoil: Recoil, tmp_path: Path) -
     assert summary["status"] == "home"
     assert summary["peak_force_N"] == pytest.approx(35.14, abs=0.01)
     assert (tmp_path / "shot.png").stat().st_size > 10_000
-    assert (tmp_path / "shot.svg").exists()
     assert (tmp_path / "shot.csv").read_text().startswith("time_s,displacement_m,velocity_m_s")
 
 

@@ -146,7 +146,7 @@ def test_the_file_has_each_design_beside_the_two_experiments_and_the_report_its_
     page = (out / "report.html").read_text()
     for name in NAMES:
         assert written[name]["title"] in page
-        assert (out / "figures" / f"figure-{name}.svg").is_file()
+        assert (out / "figures" / f"figure-{name}.png").is_file()
 
 
 def test_a_log_without_its_journal_is_left_out_and_the_reason_is_told(results, tmp_path):

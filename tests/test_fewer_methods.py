@@ -9,18 +9,10 @@ import pytest
 
 from analysis.predict.check import check
 from analysis.predict.reproduction.reproduce import prepared, reproduce
-from analysis.report.figures import style
 from analysis.summary.analyze import Request, analyze
 from recoil.config_files import new_study
-from tests.shown_panels import saved_as
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture
-def _png_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each figure the PNG, which the page shows."""
-    monkeypatch.setattr(style, "save", saved_as("png"))
 
 
 def edited(path: Path, *changes: tuple[str, str]) -> Path:
@@ -32,7 +24,6 @@ def edited(path: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("_png_alone")
 def test_a_study_with_a_method_fewer_is_checked_reproduced_and_analysed(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     new_study(folder)
@@ -54,7 +45,6 @@ def test_a_study_with_a_method_fewer_is_checked_reproduced_and_analysed(tmp_path
     assert [(pair.a, pair.b) for pair in statistics.preference.tukey or ()] == [("asymmetric-2", "vibration")]
 
 
-@pytest.mark.usefixtures("_png_alone")
 def test_a_design_with_a_level_of_0_volts_is_checked_reproduced_and_analysed(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     new_study(folder, "voltages")

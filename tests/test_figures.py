@@ -24,7 +24,7 @@ from analysis.summary.figures.results import figure_8, figure_directions
 from analysis.summary.figures.trade import figure_response_times
 from analysis.summary.results import Scores, StudyStatistics
 from analysis.summary.summary import summarize
-from tests import pdfs
+from tests import figure_files
 from tests.log_files import rating_rows, ratings_path, write_rows, write_study
 from tests.made_scores import crowd_of
 from tests.shown_panels import saved_as, shot_panel
@@ -56,7 +56,7 @@ def files_of(draw: Callable[..., None], what: object, stem: Path) -> list[Path]:
 
 
 def test_figure_5_is_written_as_png_svg_and_pdf_and_names_the_stages(tmp_path: Path) -> None:
-    with pdfs.drawn():
+    with figure_files.drawn():
         png, svg, pdf = files_of(figure_5, [shot_panel(), shot_panel(0.05)], tmp_path / "new" / "figure-5")
     assert not re.search(rb"CreationDate|Producer|matplotlib v", pdf.read_bytes())
     assert _png_size(png) == (1800, 1480)  # 9.0 x 7.4 inches at 200 dpi
@@ -117,7 +117,8 @@ def test_time_is_logarithmic_where_a_stage_would_be_too_narrow_to_see(
 
 
 def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: StudyStatistics, tmp_path: Path) -> None:
-    both, both_svg, _ = files_of(figure_8, statistics, tmp_path / "both")
+    with figure_files.drawn("svg"):
+        both, both_svg, _ = files_of(figure_8, statistics, tmp_path / "both")
     one, *_ = files_of(figure_8, replace(statistics, direction=None), tmp_path / "one")
     assert _png_size(both)[0] > 1.7 * _png_size(one)[0]
     text = both_svg.read_text(encoding="utf-8")

@@ -14,15 +14,14 @@ from analysis.logs.files import Problem
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.paper import Paper, load_paper
 from analysis.paper.recurrence import odds_of
-from analysis.report.figures import style
 from analysis.summary.comparison import compare
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
-from tests import pdfs
+from tests import figure_files
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
 from tests.made_scores import crowd_of
-from tests.shown_panels import saved_as, shot_panel
+from tests.shown_panels import shot_panel
 
 pytestmark = pytest.mark.slow
 
@@ -58,15 +57,9 @@ def report(logs: Logs, paper: Paper) -> ReportData:
 @pytest.fixture(scope="module")
 def full(report: ReportData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report") / "out"
-    with pdfs.drawn():
+    with figure_files.drawn():
         write_report(out, report)
     return out
-
-
-@pytest.fixture
-def pictures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each figure the PNG, which the page shows: for reports of which other files tell nothing new."""
-    monkeypatch.setattr(style, "save", saved_as("png"))
 
 
 def _text(page: str) -> str:
@@ -157,7 +150,8 @@ def test_statistics_json_is_unrounded_and_complete(full: Path, logs: Logs) -> No
 def test_the_same_report_is_the_same_bytes_without_dates_and_versions(
     full: Path, report: ReportData, tmp_path: Path
 ) -> None:
-    write_report(tmp_path, report)
+    with figure_files.drawn("svg"):
+        write_report(tmp_path, report)
     names = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
     assert {name.suffix for name in names} == {".html", ".md", ".json", ".png", ".svg"}
     for name in names:
@@ -175,7 +169,6 @@ def _titles(out: Path) -> list[str]:
 _ENDS = ("Provenance and assumptions",)
 
 
-@pytest.mark.usefixtures("pictures_alone")
 def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
     write_study(tmp_path / "study", participants=3)
     logs = read_logs(sorted((tmp_path / "study").rglob("*_ratings.csv")))
@@ -193,7 +186,6 @@ def test_a_report_of_nothing_says_so(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "figures").exists()
 
 
-@pytest.mark.usefixtures("pictures_alone")
 def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     statistics = summarize(read_logs([write_study(tmp_path / "study", participants=1)]))
     write_report(tmp_path / "out", ReportData(title="One", statistics=statistics))
@@ -203,7 +195,6 @@ def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     assert "(SD)" not in text.split("## Results")[1].split("## Direction")[0]
 
 
-@pytest.mark.usefixtures("pictures_alone")
 def test_files_are_named_below_their_common_folder_not_by_the_machine(tmp_path: Path) -> None:
     write_study(tmp_path / "study", participants=2)
     broken = tmp_path / "study" / "sub-P03_task-direction_trials.csv"
@@ -232,7 +223,6 @@ def test_figures_and_tables_are_numbered_from_one(full: Path) -> None:
             assert numbers == list(range(1, count + 1)), (name, kind, letter)
 
 
-@pytest.mark.usefixtures("pictures_alone")
 def test_times_by_the_experimenters_hand_are_no_response_times(tmp_path: Path) -> None:
     for code in ("P01", "P02"):
         rows = [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in trial_rows(code)]
@@ -271,10 +261,9 @@ def crowded(logs: Logs) -> ReportData:
     return ReportData(title="Two thousand", statistics=statistics, files=files, problems=bad)
 
 
-def test_a_report_of_two_thousand_stays_short(
-    crowded: ReportData, tmp_path: Path
-) -> None:  # a PDF is smaller than its SVG
-    write_report(tmp_path, crowded)
+def test_a_report_of_two_thousand_stays_short(crowded: ReportData, tmp_path: Path) -> None:
+    with figure_files.drawn("svg"):  # a PDF is smaller
+        write_report(tmp_path, crowded)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     for words in (
         "the first 50 of 2,000; everybody is in direction_wide.csv",

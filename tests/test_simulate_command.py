@@ -7,6 +7,7 @@ import pytest
 from device.physics import GunParameters, simulate
 from device.physics.hand import HandMechanics, compliant_collision, simulate_held
 from device.physics.traces import energy_balance
+from tests import figure_files
 
 pytestmark = pytest.mark.slow
 
@@ -40,7 +41,8 @@ def test_the_friction_of_the_return_can_be_set(recoil):
 
 
 def test_a_vibration_is_told_traced_and_drawn(recoil, tmp_path):
-    done = recoil("simulate", "--method", "vibration", "--trace", "v.csv", "--plot", "v.png", "--json")
+    words = ("simulate", "--method", "vibration", "--trace", "v.csv", "--plot", "v.png", "--json")
+    done = recoil(*words, **{figure_files.ASKED: "1"})
     found = json.loads(done.stdout)["summary"]
     assert found["peak_m_s2"] == pytest.approx(1000.0, rel=1e-6)
     assert found["rms_m_s2"] == pytest.approx(257.54)

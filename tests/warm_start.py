@@ -4,7 +4,7 @@ A child is a process with its own folder, environment, streams and session. Only
 done once for all tests. Who starts it holds a small process in its stead (`tests/warm_client.py`), which hands on
 signals and the exit code; if that one is killed, so is the child. How programs really start is for `tests/test_cli.py`.
 
-A child saves no figure as PDF: those are for `tests/test_figures.py` and `tests/test_report.py`.
+A child saves figures as PNG alone, unless it is asked for more (`tests/figure_files.py`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
 
-from tests import pdfs
+from tests import figure_files
 
 FOLDER = "RECOIL_TESTS_WARM_START"
 """The variable that names the folder of the server's socket."""
@@ -36,6 +36,7 @@ OWNER = "RECOIL_TESTS_WARM_OWNER"
 """The variable that names the process with whose end the server ends."""
 CLIENT = Path(__file__).with_name("warm_client.py")
 PRELOADED = [
+    "PIL.PngImagePlugin",
     "analysis.archive.bids_export",
     "analysis.predict.check",
     "analysis.predict.design_search.run",
@@ -52,12 +53,16 @@ PRELOADED = [
     "json_tricks",
     "matplotlib.pyplot",
     "openpyxl",
+    "pingouin",
     "recoil.cli",
     "recoil.config_files",
     "recoil.session",
     "recoil.study",
     "requests",
+    "rich.progress",
+    "rich.table",
     "scipy.interpolate",
+    "typer.rich_utils",
 ]
 """What programs import and what their libraries do: not PsychoPy itself, which wants a display and a home."""
 
@@ -157,6 +162,8 @@ def _be(request: list[bytes], streams: list[int]) -> NoReturn:
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(os.fsdecode(pair).split("=", 1) for pair in rest[int(count) :])
+    if figure_files.ASKED in os.environ:
+        figure_files.draw()
     sys.stdin, sys.stdout, sys.stderr = (_text(number, mode) for number, mode in enumerate("rww"))
     code = _code(_module if words[0] == "-m" else _recoil, words)
     threading._shutdown()  # type: ignore[attr-defined]  # what the interpreter does at its end
@@ -207,7 +214,7 @@ def main(address: Path, owner: int) -> NoReturn:
     for name in PRELOADED:
         with suppress(ModuleNotFoundError):  # of an extra that is not installed: a program that needs it says so itself
             importlib.import_module(name)
-    pdfs.leave_out()
+    figure_files.leave_out()
     being = address.with_name("being-made")
     with socket.socket(socket.AF_UNIX) as door:
         door.bind(str(being))
