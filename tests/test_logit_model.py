@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from scipy import stats
+from statsmodels.genmod.cov_struct import Independence
+from statsmodels.genmod.families import Binomial
+from statsmodels.genmod.generalized_estimating_equations import GEE
 
 from analysis.stats.logit_model import NO_SPREAD, logit_model
 from analysis.stats.paired import holm
@@ -25,7 +27,7 @@ def _statsmodels(successes: Any, trials: Any) -> Any:
     ]
     person, condition, right = np.array(answers).T
     design = np.column_stack([np.ones(len(right)), condition == 1, condition == 2]).astype(float)
-    model = sm.GEE(right, design, groups=person, family=sm.families.Binomial(), cov_struct=sm.cov_struct.Independence())
+    model = GEE(right, design, groups=person, family=Binomial(), cov_struct=Independence())
     return model.fit(cov_type="bias_reduced")
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from scipy import integrate, special, stats
+from statsmodels.discrete.discrete_model import Logit
+from statsmodels.tools import add_constant
 
 from analysis.stats.anova import pooled_pairs, rm_anova
 from analysis.stats.fixed_effects import indicators
@@ -51,7 +52,7 @@ def test_no_other_coefficients_are_likelier():
 def test_people_who_do_not_differ_leave_the_plain_logistic_regression():
     right = np.array([1, 0, 1, 1, 0, 0, 1, 0] * PEOPLE)
     found = random_intercept_logit(right, WHO, {"force": FORCE})
-    plain = sm.Logit(right, sm.add_constant(FORCE)).fit(disp=False)
+    plain = Logit(right, add_constant(FORCE)).fit(disp=False)
     assert found.person_sd == 0.0
     assert [one.estimate for one in found.coefficients] == pytest.approx(plain.params.tolist(), abs=1e-7)
     assert [one.se for one in found.coefficients] == pytest.approx(plain.bse.tolist(), rel=1e-6)
