@@ -26,7 +26,7 @@ from tests.other_trials import turned
 
 pytestmark = pytest.mark.slow
 
-SEEDS = 2_000
+SEEDS = 600
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 DIRECTION, PREFERENCE = changed("direction").config, changed("preference").config
 LARGEST_SEED = 2**63 - 1
@@ -168,16 +168,16 @@ def either(request: pytest.FixtureRequest) -> list[Facts]:
     return request.getfixturevalue("over_sessions" if request.param == "session" else "over_sets")
 
 
-def test_two_thousand_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts]) -> None:
+def test_six_hundred_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts]) -> None:
     assert len(either) == SEEDS
     assert all(plan.numbered for plan in either)
 
 
-def test_two_thousand_plans_have_each_method_in_one_session(either: list[Facts]) -> None:
+def test_six_hundred_plans_have_each_method_in_one_session(either: list[Facts]) -> None:
     assert all(sorted(plan.methods) == sorted(METHODS) for plan in either)
 
 
-def test_two_thousand_plans_have_ten_forward_and_ten_backward_trials_a_session(either: list[Facts]) -> None:
+def test_six_hundred_plans_have_ten_forward_and_ten_backward_trials_a_session(either: list[Facts]) -> None:
     assert all(sum(session) == 10 for plan in either for session in plan.forward)
 
 
