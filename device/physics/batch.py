@@ -76,6 +76,11 @@ def _callees_first(function: FunctionType) -> Functions:
     return found | {function: called}
 
 
+_ONCE = frozenset(["shoot", "shoot_on", "advance", "coil_step"])
+"""Each called in one place, and holding nearly all code: copied in before machine code is made of them, which else is
+made, and made fast, of all that code at each of these levels: half of the compiler's time."""
+
+
 @lru_cache(maxsize=1)
 def machine_code() -> Callable[[Records, Records], None]:
     """`_shoot_each` in machine code. `RecoilError`: there is no compiler."""
@@ -92,7 +97,8 @@ def machine_code() -> Callable[[Records, Records], None]:
         twin = FunctionType(function.__code__, space)
         twin.__qualname__ = f"{function.__name__}_{_digest(functions)}"  # the compiler's cache goes by it
         # all that is called is copied in: half the time, since a call counts the references to each array
-        twins[function] = numba.njit(error_model="numpy", cache=entry, nogil=entry, forceinline=not entry)(twin)
+        how = {"inline": "always"} if function.__name__ in _ONCE else {"forceinline": not entry}
+        twins[function] = numba.njit(error_model="numpy", cache=entry, nogil=entry, **how)(twin)
     return twins[each]  # type: ignore[no-any-return]
 
 
