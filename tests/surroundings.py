@@ -24,7 +24,7 @@ ELSEWHERE = {
 def write_sites(folder: Path) -> list[Path]:
     """Two sites with the same codes and a third with a design; broken files, and one log twice."""
     for seed, name in enumerate(("oslo", "kyoto")):
-        write_study(folder / name, participants=4, seed=seed)
+        write_study(folder / name, participants=3, seed=seed)
         (folder / name / "sub-P09_task-direction_trials.csv").write_bytes(b"")
     rows = trial_rows("P05", 5)
     write_rows(trials_path(folder / "oslo", "P05"), rows)

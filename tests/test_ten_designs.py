@@ -72,7 +72,7 @@ def means(name, question, key, count=60):
 
 
 def test_rates_are_met_in_the_mean_over_people():
-    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), 1000)
+    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), 250)
     assert found["vibration", "forward"] == pytest.approx(0.557, abs=0.03)
     assert found["asymmetric-2", "backward"] == pytest.approx(0.929, abs=0.02)
 
