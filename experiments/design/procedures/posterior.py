@@ -1,0 +1,174 @@
+"""What is known of a psychometric function after some answers, and which stimulus tells most of it next.
+
+A grid over threshold, width, lapse rate and guess rate holds the posterior. It is multiplied by the likelihood of each
+answer, so that it depends on the stimuli and answers so far alone. Arrays may have axes in front for many observers at
+once: one copy of the arithmetic serves the session and its simulation.
+
+The variance rule takes the stimulus with the least expected posterior variance of what is wanted (threshold, width, or
+both in units of their prior), all else marginalised: Kontsevich and Tyler's Psi (1999) with another loss, as in
+Prins' psi-marginal (2013). The entropy rule takes the one whose answer tells most of all parameters (QUEST+, Watson
+2017).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import entr
+
+from experiments.design.procedures.psychometric import Floats, Shape, unscaled
+
+Wanted = Literal["threshold", "width"]
+_ALIKE = 1e-9
+"""Stimuli whose gains differ relatively by less are alike: the first is taken on every machine."""
+_LEAST = 1e-300
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Grid:
+    """The parameters' values with their prior, and the stimuli.
+
+    `prior` has the shape (thresholds, widths, lapses, guesses) and sums to 1. `unscaled` is F, of the shape
+    (stimuli, thresholds × widths); `chance` and `slack` are g and 1 - g - l, of lapses × guesses.
+    """
+
+    stimuli: Floats
+    thresholds: Floats
+    widths: Floats
+    lapses: Floats
+    guesses: Floats
+    prior: Floats
+    unscaled: Floats
+    chance: Floats
+    slack: Floats
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The posterior's axes: thresholds × widths, lapses × guesses."""
+        return self.unscaled.shape[1], len(self.slack)
+
+    def values(self, wanted: Wanted) -> Floats:
+        """A parameter's value at each place of thresholds × widths."""
+        grid = np.meshgrid(self.thresholds, self.widths, indexing="ij")
+        return np.asarray(grid[wanted == "width"]).ravel()
+
+    def start(self) -> Floats:
+        """The prior, with a posterior's axes."""
+        return self.prior.reshape(self.shape)
+
+
+def grid(
+    *,
+    stimuli: Floats,
+    thresholds: Floats,
+    widths: Floats,
+    lapses: Floats,
+    guesses: Floats,
+    prior: Floats | None = None,
+    shape: Shape = "normal",
+) -> Grid:
+    """A grid; without a prior every place has the same. `ValueError`: a prior of another shape, or of nothing."""
+    sizes = (len(thresholds), len(widths), len(lapses), len(guesses))
+    weights = np.ones(sizes) if prior is None else np.asarray(prior, float)
+    if weights.shape != sizes or not np.all(weights >= 0) or not weights.sum() > 0:
+        raise ValueError(f"prior: it must have the shape {sizes}, no value below 0, and one above")
+    places = np.meshgrid(thresholds, widths, indexing="ij")
+    lapse, guess = (axis.ravel() for axis in np.meshgrid(lapses, guesses, indexing="ij"))
+    return Grid(
+        stimuli=np.asarray(stimuli, float),
+        thresholds=np.asarray(thresholds, float),
+        widths=np.asarray(widths, float),
+        lapses=np.asarray(lapses, float),
+        guesses=np.asarray(guesses, float),
+        prior=weights / weights.sum(),
+        unscaled=unscaled(np.asarray(stimuli, float)[:, None], places[0].ravel(), places[1].ravel(), shape),
+        chance=guess,
+        slack=1 - guess - lapse,
+    )
+
+
+def updated(
+    known: Grid, posterior: Floats, stimulus: NDArray[np.intp] | int, right: NDArray[np.bool_] | bool
+) -> Floats:
+    """The posterior after an answer to a stimulus, given by its place. Axes in front: one stimulus and answer each."""
+    share = known.chance + known.slack * known.unscaled[stimulus][..., None]
+    likely = posterior * np.where(np.asarray(right)[..., None, None], share, 1 - share)
+    total = likely.sum(axis=(-2, -1), keepdims=True)
+    return likely / np.where(total > 0, total, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VarianceRule:
+    """The stimulus with the least expected posterior variance of what is wanted.
+
+    The variance expected after an answer is E[t²] - (E[t; right]²/p + E[t; wrong]²/(1 - p)): only what is taken away
+    differs between stimuli. With P = g + (1 - g - l) F that needs one product of F with the posterior summed over g
+    and l. `matrix`: F, and F times each wanted t in units of its prior's standard deviation.
+    """
+
+    known: Grid
+    values: Floats
+    matrix: Floats
+
+    def gains(self, posterior: Floats) -> Floats:
+        """What each stimulus is expected to take away, of the shape (..., stimuli)."""
+        known = self.known
+        felt, guessed = posterior @ known.slack, posterior @ known.chance
+        products = felt @ self.matrix.T
+        parts = products.reshape(*products.shape[:-1], len(self.values) + 1, len(known.stimuli))
+        right = guessed.sum(-1)[..., None] + parts[..., 0, :]
+        right_t = (guessed @ self.values.T)[..., None] + parts[..., 1:, :]
+        all_t = (posterior.sum(-1) @ self.values.T)[..., None]
+        share = np.clip(right, _LEAST, 1 - 1e-16)[..., None, :]
+        taken = right_t**2 / share + (all_t - right_t) ** 2 / (1 - share)
+        return np.asarray(taken.sum(axis=-2))
+
+
+def variance_rule(known: Grid, wanted: tuple[Wanted, ...] = ("threshold",)) -> VarianceRule:
+    """The rule for a grid."""
+    weights = known.start().sum(-1)
+    values = []
+    for name in wanted:
+        one = known.values(name)
+        mean = weights @ one
+        sd = np.sqrt(weights @ (one - mean) ** 2)
+        values.append((one - mean) / (sd if sd > 0 else 1.0))
+    parts = [known.unscaled, *(known.unscaled * one for one in values)]
+    return VarianceRule(known, np.array(values), np.ascontiguousarray(np.concatenate(parts)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EntropyRule:
+    """The stimulus whose answer tells most: h(mean share) - mean h(share), h the entropy of a yes or no."""
+
+    known: Grid
+    doubt: Floats
+    """h(P) at each place of the grid, of the shape (stimuli, thresholds × widths × lapses × guesses)."""
+
+    def gains(self, posterior: Floats) -> Floats:
+        """What each answer is expected to tell, in nats, of the shape (..., stimuli)."""
+        known = self.known
+        felt = posterior @ known.slack
+        right = (posterior @ known.chance).sum(-1)[..., None] + felt @ known.unscaled.T
+        flat = posterior.reshape(*posterior.shape[:-2], -1)
+        return np.asarray(_doubt(right) - flat @ self.doubt.T)
+
+
+def entropy_rule(known: Grid) -> EntropyRule:
+    """The rule for a grid."""
+    share = known.chance + known.slack * known.unscaled[..., None]
+    return EntropyRule(known, np.ascontiguousarray(_doubt(share).reshape(len(known.stimuli), -1)))
+
+
+def _doubt(share: Floats) -> Floats:
+    return np.asarray(entr(share) + entr(1 - share))
+
+
+def best(gains: Floats) -> NDArray[np.intp]:
+    """The place of the stimulus that gains most, the first of those that are alike."""
+    most = gains.max(axis=-1, keepdims=True)
+    spread = most - gains.min(axis=-1, keepdims=True)
+    return np.asarray(np.argmax(gains >= most - _ALIKE * np.maximum(spread, _ALIKE * np.abs(most)), axis=-1))
