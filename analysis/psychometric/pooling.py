@@ -1,0 +1,82 @@
+"""A quantity of several people: its mean and spread in the group, and each person's own, drawn towards the others.
+
+Each person's true value is drawn from a normal distribution of unknown mean and standard deviation; what their own data
+say is given as draws from their own fit. Both unknowns are on a grid, the mean as likely everywhere, the standard
+deviation with a half-Cauchy prior whose scale is the spread of the people's own medians (Gelman 2006, Bayesian Anal. 1,
+515). The less one person's data say, the nearer their value is to the group's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.psychometric.fit import Estimate
+from analysis.stats.arrays import FloatArray
+from analysis.stats.frames import Result
+
+_CELLS, _MEANS, _SPREADS = 240, 80, 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group(Result):
+    """The group's mean and standard deviation, and the people's own values in their order."""
+
+    mean: Estimate
+    sd: Estimate
+    people: tuple[Estimate, ...]
+
+
+def pooled(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group:
+    """The group behind draws (n,) of each person's value, from fits whose priors were flat where the draws are.
+
+    `ValueError`: fewer than two people.
+
+    >>> near = [np.random.default_rng(i).normal(10 + i, 1, 500) for i in range(4)]
+    >>> found = pooled(near)
+    >>> round(found.mean.median), found.people[0].median > np.median(near[0])
+    (12, True)
+    """
+    if len(draws) < 2:
+        raise ValueError(f"draws must hold those of at least two people, not of {len(draws)}")
+    values, own = _histograms(draws)
+    medians = np.array([np.median(one) for one in draws])
+    scale = max(float(np.std(medians, ddof=1)), float(values[1] - values[0]))
+    means = np.linspace(values[0], values[-1], _MEANS)
+    sds = np.geomspace(float(values[1] - values[0]), 4 * float(values[-1] - values[0]), _SPREADS)
+    density = np.exp(-0.5 * ((values - means[:, None, None]) / sds[:, None]) ** 2) / sds[:, None]
+    density /= density.sum(axis=-1, keepdims=True)
+    likely = density @ own.T
+    log_weights = np.log(np.maximum(likely, 1e-300)).sum(axis=-1) + np.log(sds / (1 + (sds / scale) ** 2))
+    weights = np.exp(log_weights - log_weights.max())
+    weights /= weights.sum()
+    of_people = np.einsum("ms,msv,pv,msp->pv", weights, density, own, 1 / np.maximum(likely, 1e-300), optimize=True)
+    return Group(
+        mean=_estimate(means, weights.sum(axis=1), confidence),
+        sd=_estimate(sds, weights.sum(axis=0), confidence),
+        people=tuple(_estimate(values, one, confidence) for one in of_people),
+    )
+
+
+def difference(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Draws of a difference of two values that are known apart: the draws of the other are put in another order."""
+    mixed = np.random.default_rng(2006).permutation(len(other))
+    return np.asarray(one - other[mixed])
+
+
+def _histograms(draws: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Values that cover everybody's draws, and how each person's lie among them."""
+    low, high = min(float(one.min()) for one in draws), max(float(one.max()) for one in draws)
+    edges = np.linspace(low, high if high > low else low + 1.0, _CELLS + 1)
+    own = np.stack([np.histogram(one, edges)[0] / one.size for one in draws])
+    return (edges[1:] + edges[:-1]) / 2, own
+
+
+def _estimate(values: FloatArray, weights: FloatArray, confidence: float) -> Estimate:
+    weights = weights / weights.sum()
+    passed = np.cumsum(weights) - weights / 2
+    tail = (1 - confidence) / 2
+    low, median, high = np.interp([tail, 0.5, 1 - tail], passed, values)
+    return Estimate(median=float(median), mean=float(weights @ values), low=float(low), high=float(high))
