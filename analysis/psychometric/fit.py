@@ -19,8 +19,8 @@ from experiments.design.procedures.psychometric import Shape, unscaled
 DRAWS = 4000
 """Draws from the posterior, for what follows from several parameters at once."""
 _MOST_TRIALS = 1e6
-_ALPHAS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101, 0.46139, 0.39525)
-"""Powers of 1/1.1673…: an additive sequence that fills a cube evenly (Roberts' R sequence of five dimensions)."""
+_ALPHAS = 1.1347241384015194 ** -np.arange(1.0, 6.0)
+"""Their multiples fill a cube of five dimensions evenly: the base is the root of x^6 = x + 1."""
 
 Place = Literal["within", "below", "above", "unknown"]
 
@@ -129,20 +129,27 @@ def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape
     given = {"levels": numbers(levels, "levels"), "right": numbers(right, "right"), "trials": numbers(trials, "trials")}
     sizes = {name: array.shape for name, array in given.items()}
     if given["levels"].ndim != 1 or len(set(sizes.values())) > 1:
-        raise ValueError(f"levels, right and trials must be rows of one length, not {', '.join(map(str, sizes.values()))}")
+        raise ValueError(
+            f"levels, right and trials must be rows of one length, not {', '.join(map(str, sizes.values()))}"
+        )
     bad = (given["right"] < 0) | (given["right"] > given["trials"]) | (given["trials"] > _MOST_TRIALS)
     bad |= (given["right"] % 1 != 0) | (given["trials"] % 1 != 0)
     if bad.any():
         place = int(np.argmax(bad))
         counted = f"{given['right'][place]:g} of {given['trials'][place]:g}"
-        raise ValueError(f"right must be whole numbers from 0 to trials (at most 1,000,000), not {counted} at index {place}")
+        raise ValueError(
+            f"right must be whole numbers from 0 to trials (at most 1,000,000), not {counted} at index {place}"
+        )
     if log and (given["levels"] <= 0).any():
         raise ValueError(f"levels must be above 0 for a logarithmic axis, not {given['levels'].min():g}")
     kept = given["trials"] > 0
     if np.unique(given["levels"][kept]).size < 2:
         raise ValueError("levels must hold at least two different ones with trials")
     return Counts(
-        levels=_axis(given["levels"][kept], log=log), right=given["right"][kept], trials=given["trials"][kept], shape=shape
+        levels=_axis(given["levels"][kept], log=log),
+        right=given["right"][kept],
+        trials=given["trials"][kept],
+        shape=shape,
     )
 
 
@@ -159,10 +166,10 @@ def _draws(found: Posterior) -> FloatArray:
     passed = np.cumsum(found.weights.ravel())
     places = np.searchsorted(passed, (np.arange(DRAWS) + 0.5) / DRAWS * passed[-1])
     cells = np.unravel_index(np.minimum(places, passed.size - 1), found.weights.shape)
-    columns = []
-    for axis, cell, alpha in zip(found.axes, cells, _ALPHAS, strict=False):
-        step = float(axis[1] - axis[0]) if axis.size > 1 else 0.0
-        columns.append(axis[cell] + step * ((0.5 + alpha * np.arange(DRAWS)) % 1 - 0.5))
+    even = (0.5 + np.outer(_ALPHAS, np.arange(DRAWS))) % 1
+    columns = [
+        axis.left[cell] + axis.cells[cell] * some for axis, cell, some in zip(found.axes, cells, even, strict=True)
+    ]
     return np.stack(columns, axis=-1)
 
 
@@ -196,10 +203,14 @@ def _fit(counts: Counts, draws: FloatArray, *, log: bool, confidence: float) -> 
 def _estimate(values: FloatArray, confidence: float, back: Callable[[FloatArray], FloatArray] = np.asarray) -> Estimate:
     tail = (1 - confidence) / 2
     low, middle, high = back(np.quantile(values, [tail, 0.5, 1 - tail]))
-    return Estimate(median=float(middle), mean=float(back(values.mean(keepdims=True))[0]), low=float(low), high=float(high))
+    return Estimate(
+        median=float(middle), mean=float(back(values.mean(keepdims=True))[0]), low=float(low), high=float(high)
+    )
 
 
-def _where(counts: Counts, thresholds: FloatArray, back: Callable[[FloatArray], FloatArray]) -> tuple[Place, str | None]:
+def _where(
+    counts: Counts, thresholds: FloatArray, back: Callable[[FloatArray], FloatArray]
+) -> tuple[Place, str | None]:
     """Whether there is a threshold among the levels, and if not, what can be said."""
     low, high = float(counts.levels.min()), float(counts.levels.max())
     below, above = float((thresholds < low).mean()), float((thresholds > high).mean())
@@ -210,7 +221,10 @@ def _where(counts: Counts, thresholds: FloatArray, back: Callable[[FloatArray], 
         return "below", f"no threshold within the levels: it lies below {first:g} (probability {below:.2f})"
     if above > 0.5:
         return "above", f"no threshold within the levels: it lies above {last:g} (probability {above:.2f})"
-    return "unknown", f"no threshold within the levels: the answers do not say on which side of {first:g} to {last:g} it lies"
+    return (
+        "unknown",
+        f"no threshold within the levels: the answers do not say on which side of {first:g} to {last:g} it lies",
+    )
 
 
 def _at(draws: FloatArray, share: float, shape: Shape) -> FloatArray:
@@ -236,7 +250,7 @@ def _goodness(counts: Counts, draws: FloatArray) -> Goodness:
     if spread.max() > 0:
         many = 1 / np.maximum(spread, 1e-3) ** 2 - 1
         drawn = stream.beta(np.maximum(many * shares, 1e-9), np.maximum(many * (1 - shares), 1e-9))
-    right = stream.binomial(counts.trials.astype(int), drawn)
+    right = stream.binomial(counts.trials.astype(int), drawn).astype(float)
     own, simulated = _deviance(counts.right, counts.trials, shares), _deviance(right, counts.trials, shares)
     return Goodness(deviance=float(np.median(own)), p=float((simulated >= own - 1e-9).mean()))
 

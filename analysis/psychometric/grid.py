@@ -1,4 +1,4 @@
-"""The posterior of a psychometric function on a grid that is laid where it is, from the number of right answers a level.
+"""The posterior of a psychometric function, from the right answers a level, on a grid that is laid where it is.
 
 The number of right answers of n at a level is binomial, or beta-binomial where answers vary more than that: shares are
 drawn from Beta(ν p, ν (1 - p)) with ν = 1/η² - 1, η from 0 (binomial) to 1 (Schütt and others 2016, equation 5).
@@ -19,8 +19,8 @@ _NODES = 4096
 """Shares at which a level's likelihood is tabulated, evenly in arcsin √p, where it is smooth: an error below 1e-5."""
 _KEPT = 1e-5
 """What is left out on each side of a coarse marginal when the fine grid is laid."""
-_COARSE = (32, 32, 10, 10, 8)
-_FINE = (48, 40, 16, 16, 14)
+_COARSE = (28, 24, 7, 7, 6)
+_FINE = (44, 36, 10, 10, 10)
 NAMES = ("threshold", "width", "lapse", "guess", "overdispersion")
 """The axes of a posterior, in order."""
 
@@ -37,16 +37,34 @@ class Counts:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Posterior:
-    """Values of each of the five parameters, and how likely each combination is; it sums to 1."""
+    """Values of each of the five parameters with the cells around them, and how likely each combination is.
 
-    axes: tuple[FloatArray, ...]
+    The weights sum to 1.
+    """
+
+    axes: tuple[Axis, ...]
     weights: FloatArray
 
     def marginal(self, name: str) -> tuple[FloatArray, FloatArray]:
         """A parameter's values and their weights."""
         place = NAMES.index(name)
         others = tuple(axis for axis in range(len(NAMES)) if axis != place)
-        return self.axes[place], self.weights.sum(axis=others)
+        return self.axes[place].values, self.weights.sum(axis=others)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Axis:
+    """Values (n,) of a parameter, from `low` to `high`, each with the width of its cell; of one value, width 0."""
+
+    low: float
+    high: float
+    values: FloatArray
+    cells: FloatArray
+
+    @property
+    def left(self) -> FloatArray:
+        """Where each cell begins."""
+        return np.asarray(self.low + np.cumsum(self.cells) - self.cells)
 
 
 def posterior(counts: Counts, priors: Priors, fixed: dict[str, float]) -> Posterior:
@@ -54,57 +72,56 @@ def posterior(counts: Counts, priors: Priors, fixed: dict[str, float]) -> Poster
 
     `fixed` has the values of parameters that are known: a guess rate of 0.5, an overdispersion of 0.
     """
-    bounds = _bounds(priors)
-    coarse = _on(counts, priors, tuple(_axis(name, bounds, fixed, size) for name, size in zip(NAMES, _COARSE, strict=True)))
-    narrowed = {name: _around(*coarse.marginal(name), bounds[name]) for name in NAMES}
-    return _on(counts, priors, tuple(_axis(name, narrowed, fixed, size) for name, size in zip(NAMES, _FINE, strict=True)))
-
-
-def _bounds(priors: Priors) -> dict[str, tuple[float, float]]:
-    return {
+    bounds = {
         "threshold": (priors.threshold.low, priors.threshold.high),
         "width": (priors.width.low, priors.width.high),
         "lapse": (0.0, priors.lapse.most),
         "guess": (0.0, priors.guess.most),
         "overdispersion": (0.0, priors.overdispersion.most),
     }
+    bounds |= {name: (value, value) for name, value in fixed.items()}
+    coarse = _on(counts, priors, tuple(map(_axis, NAMES, (bounds[name] for name in NAMES), _COARSE)))
+    narrowed = [_around(axis, coarse.marginal(name)[1]) for name, axis in zip(NAMES, coarse.axes, strict=True)]
+    return _on(counts, priors, tuple(map(_axis, NAMES, narrowed, _FINE)))
 
 
-def _axis(name: str, bounds: dict[str, tuple[float, float]], fixed: dict[str, float], size: int) -> FloatArray:
-    """The middles of so many cells between two bounds, or the one value that is fixed."""
-    if name in fixed:
-        return np.array([fixed[name]])
-    low, high = bounds[name]
-    return np.asarray(low + (high - low) * (np.arange(size) + 0.5) / size)
+def _axis(name: str, bounds: tuple[float, float], size: int) -> Axis:
+    """Middles of even cells; of a rate, whose density ends at its bound, the nodes of Gauss and Legendre."""
+    low, high = bounds
+    if low == high:
+        return Axis(low=low, high=high, values=np.array([low]), cells=np.zeros(1))
+    if name in ("threshold", "width"):
+        cells = np.full(size, (high - low) / size)
+        return Axis(low=low, high=high, values=low + cells * (np.arange(size) + 0.5), cells=cells)
+    nodes, weights = np.polynomial.legendre.leggauss(size)
+    return Axis(low=low, high=high, values=low + (high - low) * (nodes + 1) / 2, cells=(high - low) * weights / 2)
 
 
-def _around(values: FloatArray, weights: FloatArray, bounds: tuple[float, float]) -> tuple[float, float]:
+def _around(axis: Axis, weights: FloatArray) -> tuple[float, float]:
     """Where a marginal is, with a cell to spare on both sides."""
-    if values.size == 1:
-        return bounds
-    cell, passed = float(values[1] - values[0]), np.cumsum(weights)
-    first = int(np.searchsorted(passed, _KEPT))
-    last = int(np.searchsorted(passed, 1 - _KEPT))
-    low = float(values[max(first - 1, 0)]) - cell / 2
-    high = float(values[min(last + 1, values.size - 1)]) + cell / 2
-    return max(low, bounds[0]), min(high, bounds[1])
+    if axis.values.size == 1:
+        return axis.low, axis.high
+    passed = np.cumsum(weights)
+    first, last = int(np.searchsorted(passed, _KEPT)), int(np.searchsorted(passed, 1 - _KEPT))
+    edges = np.append(axis.left, axis.high)
+    return float(edges[max(first - 1, 0)]), float(edges[min(last + 2, edges.size - 1)])
 
 
-def _on(counts: Counts, priors: Priors, axes: tuple[FloatArray, ...]) -> Posterior:
+def _on(counts: Counts, priors: Priors, axes: tuple[Axis, ...]) -> Posterior:
     log_density = _log_likelihood(counts, axes)
-    for place, (name, values) in enumerate(zip(NAMES, axes, strict=True)):
-        if values.size > 1:
+    for place, (name, axis) in enumerate(zip(NAMES, axes, strict=True)):
+        if axis.values.size > 1:
             with np.errstate(divide="ignore"):
-                log_prior = np.log(getattr(priors, name).density(values))
-            log_density += log_prior.reshape([-1 if axis == place else 1 for axis in range(len(NAMES))])
+                log_prior = np.log(getattr(priors, name).density(axis.values) * axis.cells)
+            log_density += log_prior.reshape([-1 if other == place else 1 for other in range(len(NAMES))])
     weights = np.exp(log_density - log_density.max())
     return Posterior(axes=axes, weights=weights / weights.sum())
 
 
-def _log_likelihood(counts: Counts, axes: tuple[FloatArray, ...]) -> FloatArray:
+def _log_likelihood(counts: Counts, axes: tuple[Axis, ...]) -> FloatArray:
     """Of the shape of the axes; the number of orders of the answers, which is the same everywhere, is left out."""
-    thresholds, widths, lapses, guesses, spreads = axes
-    total = np.zeros([len(axis) for axis in axes])
+    thresholds, widths, lapses, guesses, spreads = (axis.values for axis in axes)
+    total = np.zeros([axis.size for axis in (thresholds, widths, lapses, guesses, spreads)])
     slack = 1 - lapses[:, None] - guesses
     for level, right, trials in zip(counts.levels, counts.right, counts.trials, strict=True):
         felt = unscaled(level, thresholds[:, None], widths, counts.shape)

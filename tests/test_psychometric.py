@@ -1,0 +1,141 @@
+"""Psychometric fits: psignifit's means, honest ends, what follows from levels that are moved or stretched, pooling."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from analysis.psychometric.fit import PsychometricFit, psychometric_fit
+from analysis.psychometric.pooling import difference, pooled
+
+GOLDEN: list[dict[str, Any]] = json.loads((Path(__file__).parent / "golden" / "psignifit.json").read_text())
+LEVELS, TRIALS = np.array([6.0, 8.0, 10.0, 12.0, 14.0]), np.full(5, 20)
+RIGHT = np.array([10, 12, 15, 19, 20])
+
+
+@pytest.fixture(scope="module")
+def fit() -> PsychometricFit:
+    return psychometric_fit(LEVELS, RIGHT, TRIALS, guess=0.5)
+
+
+@pytest.mark.parametrize("case", GOLDEN, ids=lambda case: f"{case['kind']}{' overdispersed' * case['overdispersed']}")
+def test_means_are_those_of_psignifit_under_its_priors(case: dict[str, Any]) -> None:
+    """Within 0.02 of the standard deviation, 2, that the data were drawn with; its own grid is coarser."""
+    guess = 0.5 if case["kind"] == "2AFC" else None
+    trials = [case["trials"]] * len(case["levels"])
+    found = psychometric_fit(case["levels"], case["right"], trials, guess=guess, overdispersed=case["overdispersed"])
+    assert found.threshold.mean == pytest.approx(case["mean"]["threshold"], abs=0.04)
+    assert found.width.mean == pytest.approx(case["mean"]["width"], abs=0.04 * 3.29)
+    for rate in ("lapse", "guess", "overdispersion"):
+        assert getattr(found, rate).mean == pytest.approx(case["mean"][rate], abs=0.005)
+
+
+def test_a_fit_moves_and_stretches_with_its_levels(fit: PsychometricFit) -> None:
+    moved = psychometric_fit(LEVELS * 1e-6 + 3.0, RIGHT, TRIALS, guess=0.5)
+    assert moved.threshold.median == pytest.approx(fit.threshold.median * 1e-6 + 3.0, rel=1e-9)
+    assert moved.width.median == pytest.approx(fit.width.median * 1e-6, rel=1e-6)
+    assert moved.goodness.p == fit.goodness.p
+
+
+def test_a_logarithmic_axis_is_a_fit_of_logarithms(fit: PsychometricFit) -> None:
+    of_logs = psychometric_fit(np.log(LEVELS), RIGHT, TRIALS, guess=0.5)
+    logarithmic = psychometric_fit(LEVELS, RIGHT, TRIALS, guess=0.5, log=True)
+    assert logarithmic.threshold.median == pytest.approx(np.exp(of_logs.threshold.median))
+    assert logarithmic.jnd.median == pytest.approx(np.exp(of_logs.jnd.median))
+    assert logarithmic.curve([9.0])[0] == pytest.approx(of_logs.curve(np.log([9.0]))[0])
+
+
+def test_levels_in_any_order_and_split_are_the_same_data(fit: PsychometricFit) -> None:
+    split = psychometric_fit(
+        np.concatenate([LEVELS[::-1], LEVELS]),
+        np.concatenate([RIGHT[::-1] - 5, [5] * 5]),
+        [15] * 5 + [5] * 5,
+        guess=0.5,
+    )
+    assert split.threshold.median == pytest.approx(fit.threshold.median, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("right", "guess", "where", "said"),
+    [
+        ([0] * 5, None, "above", "it lies above 14"),
+        ([20] * 5, None, "below", "it lies below 6"),
+        ([20] * 5, 0.5, "below", "it lies below 6"),
+        ([10] * 5, 0.5, "above", "it lies above 14"),
+    ],
+)
+def test_data_without_a_threshold_get_none(right: list[int], guess: float | None, where: str, said: str) -> None:
+    found = psychometric_fit(LEVELS, right, TRIALS, guess=guess)
+    assert found.where == where
+    assert found.reason is not None
+    assert found.reason.startswith("no threshold within the levels")
+    assert said in found.reason
+
+
+def test_answers_that_vary_more_than_binomially_are_told_and_fitted() -> None:
+    """Shares of 0.1 and 0.9 by turns are no function: the fit check says so, and overdispersion widens the interval."""
+    right = [2, 18, 2, 18, 2, 18, 2, 18]
+    levels, trials = np.arange(8.0), [20] * 8
+    plain = psychometric_fit(levels, right, trials, guess=None)
+    wide = psychometric_fit(levels, right, trials, guess=None, overdispersed=True)
+    assert plain.goodness.p < 0.001
+    assert wide.goodness.p > 0.01
+    assert wide.overdispersion.low > 0.1
+    assert wide.threshold.high - wide.threshold.low > plain.threshold.high - plain.threshold.low
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    """Forty data sets whose parameters are drawn from the priors; all of 2,000 are in `make soak`."""
+    draws, held = np.random.default_rng(8), 0
+    for _ in range(40):
+        threshold, width, lapse = draws.uniform(6, 14), draws.uniform(4, 8), draws.beta(1, 10) / 2
+        shares = 0.5 + (0.5 - lapse) * norm.cdf((LEVELS - threshold) / width * 3.2897)
+        found = psychometric_fit(LEVELS, draws.binomial(20, shares), TRIALS, guess=0.5)
+        held += found.threshold.low <= threshold <= found.threshold.high
+    assert held >= 34  # 38 are expected; fewer than 34 come once in a hundred such tests
+
+
+def test_levels_at_shares_of_the_function(fit: PsychometricFit) -> None:
+    assert fit.level_at(0.5) == fit.threshold
+    assert fit.level_at(0.75).median - fit.level_at(0.25).median == pytest.approx(2 * fit.jnd.median, rel=0.1)
+    middle, low, high = fit.curve([6.0, 10.0, 14.0])
+    assert np.all((low <= middle) & (middle <= high))
+    assert np.all(np.diff(middle) > 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"levels": [6.0] * 5}, "levels must hold at least two different ones with trials"),
+        ({"right": [21, 0, 0, 0, 0]}, "right must be whole numbers from 0 to trials .*, not 21 of 20 at index 0"),
+        ({"right": [0.5, 0, 0, 0, 0]}, "right must be whole numbers"),
+        ({"trials": [20] * 4}, "levels, right and trials must be rows of one length"),
+        ({"levels": [-1.0, 0, 1, 2, 3], "log": True}, "levels must be above 0 for a logarithmic axis, not -1"),
+        ({"guess": 1.0}, "guess must be at least 0 and below 1, not 1"),
+        ({"guess": float("nan")}, "guess must be at least 0 and below 1, not nan"),
+        ({"confidence": 1.0}, "confidence must be above 0 and below 1, not 1"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_by_name(change: dict[str, Any], said: str) -> None:
+    given: dict[str, Any] = {"levels": LEVELS, "right": RIGHT, "trials": TRIALS, "guess": 0.5}
+    with pytest.raises(ValueError, match=said):
+        psychometric_fit(**(given | change))
+
+
+def test_a_group_draws_its_people_towards_each_other_by_how_little_they_say() -> None:
+    stream = np.random.default_rng(4)
+    sure, vague = [stream.normal(10 + place, 0.2, 2000) for place in range(5)], stream.normal(30, 12, 2000)
+    group = pooled([*sure, vague])
+    assert group.people[0].median == pytest.approx(10, abs=0.2)
+    assert group.people[5].median < 20
+    assert group.mean.low < 12 < group.mean.high
+
+
+def test_a_difference_does_not_pair_draws() -> None:
+    ordered = np.sort(np.random.default_rng(1).normal(size=4000))
+    assert np.std(difference(ordered, ordered)) == pytest.approx(np.sqrt(2), abs=0.05)
