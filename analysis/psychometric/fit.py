@@ -110,7 +110,7 @@ def psychometric_fit(
 
     >>> found = psychometric_fit([6, 8, 10, 12, 14], [10, 12, 15, 19, 20], [20] * 5, guess=0.5)
     >>> found.where, round(found.threshold.median, 1)
-    ('within', 9.7)
+    ('within', 9.5)
     """
     counts = _counts(levels, right, trials, shape, log=log)
     if not 0 < confidence < 1:
