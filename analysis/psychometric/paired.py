@@ -1,0 +1,197 @@
+"""Scores from paired comparisons: Bradley and Terry, Thurstone's case V, ties, and how consistent the choices are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize
+from scipy.sparse.csgraph import connected_components
+from scipy.special import log_expit, log_ndtr, logsumexp, ndtri
+
+from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.frames import Result
+
+Model = Literal["bradley-terry", "thurstone"]
+_LEAST = -40.0
+"""A log probability below which nothing more is told apart."""
+_STEP, _POLISHED = 1e-3, 20
+"""Of derivatives by differences of the fourth order, whose error is that of rounding; Newton's steps at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ItemScore(Result):
+    """An item's score, in logits (Bradley and Terry) or in units of sd √2 (Thurstone); the items' sum is 0."""
+
+    item: Hashable
+    score: float
+    se: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairedScores(Result):
+    """The scores of all items in their order; none for a `reason`. `tie`: the tie parameter, 0 without ties."""
+
+    model: Model
+    scores: tuple[ItemScore, ...] = ()
+    tie: float = 0.0
+    log_likelihood: float | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Consistency(Result):
+    """Circular triads (A over B over C over A) among the `triads` whose three pairs were all decided.
+
+    `zeta` is Kendall's coefficient of consistency, from 0 (as circular as it gets) to 1; only of complete designs.
+    """
+
+    triads: int
+    circular: int
+    zeta: float | None = None
+
+
+def paired_scores(
+    items: Sequence[Hashable],
+    wins: ArrayLike,
+    ties: ArrayLike | None = None,
+    *,
+    model: Model = "bradley-terry",
+    confidence: float = 0.95,
+) -> PairedScores:
+    """Scores by maximum likelihood from `wins` (n, n): how often the row was chosen over the column.
+
+    Bradley and Terry: P(i over j) = 1 / (1 + exp(s_j - s_i)), with `ties` (n, n; each pair's, on both sides) as
+    Davidson (1970) has them: P(tie) is proportional to ν √(w_i w_j). Thurstone's case V: P(i over j) = Φ(s_i - s_j),
+    with ties where the difference is within τ (Glenn and David 1960). Intervals are score ± z se.
+    There are no scores, and a `reason`, where some items were never chosen over the others (Ford 1957): one could be as
+    far above as one likes. `ValueError`: counts that are none, or not of a square of the items.
+
+    >>> found = paired_scores(["a", "b", "c"], [[0, 7, 9], [3, 0, 6], [1, 4, 0]])
+    >>> [(one.item, round(one.score, 3)) for one in found.scores]
+    [('a', 0.944), ('b', -0.16), ('c', -0.783)]
+    """
+    won, tied = _checked(items, wins, "wins"), np.zeros((len(items), len(items)))
+    if ties is not None:
+        tied = _checked(items, ties, "ties")
+        if not np.array_equal(tied, tied.T):
+            raise ValueError("ties must be the same on both sides of each pair")
+    if not 0 < confidence < 1:
+        raise ValueError(f"confidence must be above 0 and below 1, not {confidence:g}")
+    if reason := _not_connected(items, won + tied / 2):
+        return PairedScores(model=model, reason=reason)
+    free = len(items) - 1 + bool(tied.any())
+    fit = _maximum(lambda at: -_log_likelihood(at, won, tied, model), np.zeros(free))
+    covariance = np.linalg.inv(_curvature(lambda at: -_log_likelihood(at, won, tied, model), fit))
+    basis = _basis(len(items))
+    scores, spread = basis @ fit[: len(items) - 1], basis @ covariance[: len(items) - 1, : len(items) - 1] @ basis.T
+    z, ses = float(ndtri((1 + confidence) / 2)), np.sqrt(np.diag(spread))
+    return PairedScores(
+        model=model,
+        scores=tuple(
+            ItemScore(item=item, score=float(s), se=float(se), low=float(s - z * se), high=float(s + z * se))
+            for item, s, se in zip(items, scores, ses, strict=True)
+        ),
+        tie=float(np.exp(fit[-1])) if tied.any() else 0.0,
+        log_likelihood=float(_log_likelihood(fit, won, tied, model)),
+    )
+
+
+def consistency(items: Sequence[Hashable], wins: ArrayLike) -> Consistency:
+    """How consistent one person's choices are; a pair is decided for the item that was chosen more often.
+
+    ζ = 1 - 24 d / (n³ - n) for odd n, 1 - 24 d / (n³ - 4 n) for even n (Kendall and Babington Smith 1940).
+
+    >>> consistency("abc", [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    Consistency(triads=1, circular=1, zeta=0.0)
+    """
+    won, n = _checked(items, wins, "wins"), len(items)
+    above = (won > won.T).astype(float)
+    decided = above + above.T
+    triads, circular = round(np.trace(decided @ decided @ decided) / 6), round(np.trace(above @ above @ above) / 3)
+    most = (n**3 - (n if n % 2 else 4 * n)) / 24
+    complete = n > 2 and decided.sum() == n * (n - 1)
+    return Consistency(triads=triads, circular=circular, zeta=1 - circular / most if complete else None)
+
+
+def _checked(items: Sequence[Hashable], counts: ArrayLike, name: str) -> FloatArray:
+    found, n = numbers(counts, name), len(items)
+    if n < 2 or len(set(items)) < n:
+        raise ValueError(f"items must be at least two, each once, not {list(items)}")
+    if found.shape != (n, n):
+        raise ValueError(f"{name} must be of the shape ({n}, {n}), a row and a column an item, not {found.shape}")
+    if (found < 0).any() or found.diagonal().any():
+        raise ValueError(f"{name} must not be below 0, and 0 for an item and itself")
+    return found
+
+
+def _not_connected(items: Sequence[Hashable], won: FloatArray) -> str:
+    """Why there are no scores; empty if each item can be reached from each other by choices."""
+    parts, part = connected_components(won > 0, directed=True, connection="strong")
+    if parts == 1:
+        return ""
+    apart, group = connected_components(won > 0, directed=False)
+    if apart > 1:
+        return f"never compared with each other: {_named(items, group)}"
+    return f"never chosen over the others, or always: {_named(items, part)}; one more choice the other way would do"
+
+
+def _named(items: Sequence[Hashable], groups: Iterable[int]) -> str:
+    groups = list(groups)
+    members = (
+        [str(item) for item, of in zip(items, groups, strict=True) if of == group] for group in range(max(groups) + 1)
+    )
+    return " | ".join(", ".join(some) for some in members)
+
+
+def _basis(n: int) -> FloatArray:
+    """(n, n - 1): orthonormal columns that each sum to 0."""
+    return np.asarray(np.linalg.qr(np.eye(n) - 1 / n)[0][:, : n - 1])
+
+
+def _log_likelihood(at: FloatArray, won: FloatArray, tied: FloatArray, model: Model) -> float:
+    n = len(won)
+    scores = _basis(n) @ at[: n - 1]
+    difference = scores[:, None] - scores
+    if not tied.any():
+        chosen = log_expit(difference) if model == "bradley-terry" else log_ndtr(difference)
+        return float((won * chosen).sum())
+    if model == "bradley-terry":
+        middle = at[-1] + np.zeros_like(difference)
+        total = logsumexp([difference / 2, -difference / 2, middle], axis=0)
+        chosen, drawn = difference / 2 - total, middle - total
+    else:
+        reach = np.exp(at[-1])
+        chosen = log_ndtr(difference - reach)
+        upper, lower = log_ndtr(reach - difference), log_ndtr(-reach - difference)
+        drawn = upper + np.log(np.maximum(-np.expm1(lower - upper), np.exp(_LEAST)))
+    return float((won * chosen).sum() + (tied * drawn).sum() / 2)
+
+
+def _maximum(loss: Callable[[FloatArray], float], start: FloatArray) -> FloatArray:
+    """The minimum of a convex loss, by quasi-Newton steps and then Newton's own until they are tiny."""
+    at = np.asarray(minimize(loss, start, method="BFGS").x)
+    for _ in range(_POLISHED):
+        step = np.linalg.solve(_curvature(loss, at), _gradient(loss, at))
+        at = at - step
+        if np.abs(step).max() < 1e-10:
+            break
+    return np.asarray(at)
+
+
+def _gradient(loss: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
+    steps = np.eye(at.size) * _STEP
+    return np.array(
+        [(8 * (loss(at + h) - loss(at - h)) - loss(at + 2 * h) + loss(at - 2 * h)) / (12 * _STEP) for h in steps]
+    )
+
+
+def _curvature(loss: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
+    steps = np.eye(at.size) * _STEP
+    rows = np.array([(_gradient(loss, at + h) - _gradient(loss, at - h)) / (2 * _STEP) for h in steps])
+    return np.asarray((rows + rows.T) / 2)

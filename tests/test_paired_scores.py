@@ -1,0 +1,108 @@
+"""Paired comparison: choix's scores, ties, who cannot be scored, and circular triads."""
+
+from __future__ import annotations
+
+import json
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+from scipy.stats import norm
+
+from analysis.psychometric.paired import Model, consistency, paired_scores
+
+GOLDEN: list[dict[str, Any]] = json.loads((Path(__file__).parent / "golden" / "choix.json").read_text())
+WINS = np.array([[0, 7, 9], [3, 0, 6], [1, 4, 0]])
+MODELS: tuple[Model, ...] = ("bradley-terry", "thurstone")
+
+
+def scored(wins: Any, **more: Any) -> np.ndarray:
+    found = paired_scores(range(len(wins)), wins, **more)
+    assert found.reason is None
+    return np.array([one.score for one in found.scores])
+
+
+@pytest.mark.parametrize("case", GOLDEN[:12], ids=str)
+def test_scores_are_those_of_choix(case: dict[str, Any]) -> None:
+    assert scored(case["wins"]) == pytest.approx(case["scores"], abs=1e-6)
+
+
+def test_two_items_have_the_score_of_their_share() -> None:
+    """By hand: the logit, or normal score, of 8 of 10; the se of a logit is 1 / √(n p (1 - p))."""
+    wins = [[0, 8], [2, 0]]
+    assert np.diff(scored(wins))[0] == pytest.approx(-np.log(4), abs=1e-9)
+    assert np.diff(scored(wins, model="thurstone"))[0] == pytest.approx(norm.ppf(0.2), abs=1e-9)
+    assert paired_scores("ab", wins).scores[0].se == pytest.approx(0.5 / np.sqrt(10 * 0.8 * 0.2), rel=1e-6)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_ties_are_fitted_as_often_as_they_come(model: Model) -> None:
+    """Of two items alone the model has as many parameters as there are shares: 5 over, 3 under, 2 ties."""
+    found = paired_scores("ab", [[0, 5], [3, 0]], [[0, 2], [2, 0]], model=model)
+    difference = found.scores[0].score - found.scores[1].score
+    if model == "bradley-terry":
+        weights = np.array([np.exp(difference / 2), np.exp(-difference / 2), found.tie])
+        assert weights / weights.sum() == pytest.approx([0.5, 0.3, 0.2], abs=1e-6)
+    else:
+        assert norm.cdf(difference - found.tie) == pytest.approx(0.5, abs=1e-6)
+        assert norm.cdf(-difference - found.tie) == pytest.approx(0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@given(some.permutations(range(3)))
+def test_the_order_of_the_items_is_nothing(model: Model, order: list[int]) -> None:
+    assert scored(WINS[np.ix_(order, order)], model=model) == pytest.approx(scored(WINS, model=model)[order], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("wins", "said"),
+    [
+        ([[0, 3, 0, 0], [1, 0, 0, 0], [0, 0, 0, 2], [0, 0, 2, 0]], "never compared with each other: a, b | c, d"),
+        ([[0, 7, 9, 1], [0, 0, 6, 1], [0, 4, 0, 1], [0, 1, 1, 0]], "never chosen over the others, or always"),
+        (np.zeros((4, 4)), "never compared with each other: a | b | c | d"),
+    ],
+)
+def test_items_without_scores_are_named(wins: Any, said: str) -> None:
+    found = paired_scores("abcd", wins)
+    assert found.scores == ()
+    assert found.reason is not None
+    assert found.reason.startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("items", "wins", "more", "said"),
+    [
+        ("aab", WINS, {}, "items must be at least two, each once"),
+        ("ab", WINS, {}, r"wins must be of the shape \(2, 2\)"),
+        ("abc", -WINS, {}, "wins must not be below 0"),
+        ("abc", WINS + np.eye(3), {}, "wins must not be below 0, and 0 for an item and itself"),
+        ("abc", WINS, {"ties": WINS}, "ties must be the same on both sides"),
+        ("abc", WINS, {"confidence": 0.0}, "confidence must be above 0"),
+    ],
+)
+def test_counts_that_are_none_are_refused(items: str, wins: Any, more: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        paired_scores(items, wins, **more)
+
+
+@given(some.integers(3, 7), some.randoms(use_true_random=False))
+def test_circular_triads_are_counted_as_by_hand(n: int, draws: Any) -> None:
+    wins = np.zeros((n, n), int)
+    for one, other in combinations(range(n), 2):
+        first = draws.random() < 0.5
+        wins[(one, other) if first else (other, one)] = 1
+    found = consistency(range(n), wins)
+    by_hand = sum(
+        len({(wins[a, b], wins[b, c], wins[c, a])} & {(0, 0, 0), (1, 1, 1)}) for a, b, c in combinations(range(n), 3)
+    )
+    assert (found.triads, found.circular) == (n * (n - 1) * (n - 2) // 6, by_hand)
+    assert found.zeta is not None
+    assert -1e-12 <= found.zeta <= 1
+
+
+def test_an_incomplete_design_has_no_coefficient() -> None:
+    assert consistency("abc", [[0, 1, 0], [0, 0, 0], [0, 0, 0]]).zeta is None
