@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as some
 from scipy.stats import norm
 
-from analysis.psychometric.paired import Model, consistency, paired_scores
+from analysis.psychometric.paired import PairModel, consistency, paired_scores
 
 GOLDEN: list[dict[str, Any]] = json.loads((Path(__file__).parent / "golden" / "choix.json").read_text())
 WINS = np.array([[0, 7, 9], [3, 0, 6], [1, 4, 0]])
-MODELS: tuple[Model, ...] = ("bradley-terry", "thurstone")
+MODELS: tuple[PairModel, ...] = ("bradley-terry", "thurstone")
 
 
 def scored(wins: Any, **more: Any) -> np.ndarray:
@@ -40,7 +40,7 @@ def test_two_items_have_the_score_of_their_share() -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_ties_are_fitted_as_often_as_they_come(model: Model) -> None:
+def test_ties_are_fitted_as_often_as_they_come(model: PairModel) -> None:
     """Of two items alone the model has as many parameters as there are shares: 5 over, 3 under, 2 ties."""
     found = paired_scores("ab", [[0, 5], [3, 0]], [[0, 2], [2, 0]], model=model)
     difference = found.scores[0].score - found.scores[1].score
@@ -54,7 +54,7 @@ def test_ties_are_fitted_as_often_as_they_come(model: Model) -> None:
 
 @pytest.mark.parametrize("model", MODELS)
 @given(some.permutations(range(3)))
-def test_the_order_of_the_items_is_nothing(model: Model, order: list[int]) -> None:
+def test_the_order_of_the_items_is_nothing(model: PairModel, order: list[int]) -> None:
     assert scored(WINS[np.ix_(order, order)], model=model) == pytest.approx(scored(WINS, model=model)[order], abs=1e-8)
 
 

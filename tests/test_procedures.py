@@ -10,9 +10,9 @@ from scipy.stats import norm
 
 from experiments.design.procedures import posterior, psychometric
 from experiments.design.procedures.psychometric import Shape
-from experiments.design.procedures.up_down import Kesten, Range, Stop, UpDown, track
+from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown, track_after
 
-WIDE = Range(low=-1e6, high=1e6)
+WIDE = LevelRange(low=-1e6, high=1e6)
 SHAPES: tuple[Shape, ...] = ("normal", "logistic", "gumbel", "reversed-gumbel")
 
 
@@ -22,8 +22,8 @@ SHAPES: tuple[Shape, ...] = ("normal", "logistic", "gumbel", "reversed-gumbel")
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_function_is_a_half_at_its_threshold_and_its_tails_are_a_width_apart(shape: Shape) -> None:
     levels = np.linspace(-50, 70, 1201)
-    shares = psychometric.unscaled(levels, 10.0, 4.0, shape)
-    assert psychometric.unscaled(10.0, 10.0, 4.0, shape) == pytest.approx(0.5)
+    shares = psychometric.share_felt(levels, 10.0, 4.0, shape)
+    assert psychometric.share_felt(10.0, 10.0, 4.0, shape) == pytest.approx(0.5)
     assert np.all(np.diff(shares) >= 0)
     assert shares[0] == pytest.approx(0, abs=1e-12)
     low, high = np.interp([0.05, 0.95], shares, levels)
@@ -32,7 +32,7 @@ def test_a_function_is_a_half_at_its_threshold_and_its_tails_are_a_width_apart(s
 
 def test_a_cumulative_normal_is_that_of_scipy() -> None:
     levels = np.linspace(-3, 3, 13)
-    assert psychometric.unscaled(levels, 0.5, psychometric.width_of(0.7)) == pytest.approx(norm.cdf(levels, 0.5, 0.7))
+    assert psychometric.share_felt(levels, 0.5, psychometric.width_of(0.7)) == pytest.approx(norm.cdf(levels, 0.5, 0.7))
 
 
 # up and down
@@ -45,10 +45,10 @@ def up_downs(draw: some.DrawFn) -> UpDown:
     return UpDown(
         start=draw(some.floats(0, 20)),
         steps=tuple(draw(some.lists(some.floats(0.1, 3), min_size=1, max_size=3))),
-        within=Range(
+        within=LevelRange(
             low=0, high=20, grain=draw(some.sampled_from([0.0, 0.5])), easier=draw(some.sampled_from([-1, 1]))
         ),
-        stop=Stop(trials=draw(some.integers(0, 40)), reversals=draw(some.integers(1, 12))),
+        stop=TrackEnd(trials=draw(some.integers(0, 40)), reversals=draw(some.integers(1, 12))),
         up=draw(some.integers(1, 3)),
         down=draw(some.integers(1, 4)),
         ratio=draw(some.floats(0.3, 3)),
@@ -57,7 +57,7 @@ def up_downs(draw: some.DrawFn) -> UpDown:
 
 @given(up_downs(), some_answers)
 def test_a_track_stays_in_its_range_on_its_grid_and_stops_when_it_is_told(rule: UpDown, answers: list[bool]) -> None:
-    found = track(rule, answers)
+    found = track_after(rule, answers)
     for level in (*found.levels, *(() if found.next_level is None else (found.next_level,))):
         assert 0 <= level <= 20
         assert not rule.within.grain or level / rule.within.grain == pytest.approx(round(level / rule.within.grain))
@@ -73,30 +73,30 @@ def test_what_comes_next_is_that_of_the_answers_however_they_came(
     """An answer that is corrected counts as if it had been given so at once: what comes before is as it was."""
     place = data.draw(some.integers(0, max(0, len(answers) - 1)))
     other = [right != (number == place) for number, right in enumerate(answers)]
-    found, corrected = track(rule, answers).levels, track(rule, other).levels
+    found, corrected = track_after(rule, answers).levels, track_after(rule, other).levels
     assert found[: place + 1] == corrected[: place + 1]
 
 
 def test_a_track_turns_where_it_should() -> None:
     """Two down, one up, by hand; levels at which the direction changed."""
-    rule = UpDown(start=10.0, steps=(2.0, 1.0), within=WIDE, stop=Stop(reversals=3), down=2)
-    found = track(rule, [True, True, True, False, True, True, False])
+    rule = UpDown(start=10.0, steps=(2.0, 1.0), within=WIDE, stop=TrackEnd(reversals=3), down=2)
+    found = track_after(rule, [True, True, True, False, True, True, False])
     assert found.levels == (10.0, 10.0, 8.0, 8.0, 9.0, 9.0, 8.0)
     assert (found.reversals, found.next_level) == ((8.0, 9.0, 8.0), None)
     assert found.mean_of_reversals == 8.5
 
 
 def test_a_track_at_the_end_of_its_range_says_so() -> None:
-    rule = UpDown(start=1.0, steps=(2.0,), within=Range(low=0, high=9), stop=Stop(trials=9))
-    assert (track(rule, [True]).next_level, track(rule, [True]).at_edge) == (0.0, True)
-    assert not track(rule, [True, False]).at_edge
+    rule = UpDown(start=1.0, steps=(2.0,), within=LevelRange(low=0, high=9), stop=TrackEnd(trials=9))
+    assert (track_after(rule, [True]).next_level, track_after(rule, [True]).at_edge) == (0.0, True)
+    assert not track_after(rule, [True, False]).at_edge
 
 
 def test_factors_multiply_and_a_higher_level_may_be_harder() -> None:
-    within = Range(low=0.1, high=100, factors=True, easier=-1)
-    rule = UpDown(start=10.0, steps=(2.0,), within=within, stop=Stop(trials=9), ratio=3.0)
-    assert track(rule, [True]).next_level == 20.0
-    assert track(rule, [False]).next_level == 1.25
+    within = LevelRange(low=0.1, high=100, factors=True, easier=-1)
+    rule = UpDown(start=10.0, steps=(2.0,), within=within, stop=TrackEnd(trials=9), ratio=3.0)
+    assert track_after(rule, [True]).next_level == 20.0
+    assert track_after(rule, [False]).next_level == 1.25
 
 
 @pytest.mark.parametrize(
@@ -105,31 +105,31 @@ def test_factors_multiply_and_a_higher_level_may_be_harder() -> None:
 )
 def test_targets_are_those_of_the_books(down: int, up: int, ratio: float, target: float) -> None:
     """Levitt (1971, table I) and Kaernbach (1991, equation 1)."""
-    rule = UpDown(start=0.0, steps=(1.0,), within=WIDE, stop=Stop(trials=9), down=down, up=up, ratio=ratio)
+    rule = UpDown(start=0.0, steps=(1.0,), within=WIDE, stop=TrackEnd(trials=9), down=down, up=up, ratio=ratio)
     assert rule.target == pytest.approx(target, abs=1e-12)
 
 
 @pytest.mark.parametrize(
     "rule",
     [
-        UpDown(start=1.0, steps=(0.1,), within=WIDE, stop=Stop(trials=3000), down=2),
-        UpDown(start=1.0, steps=(0.1,), within=WIDE, stop=Stop(trials=3000), ratio=3.0),
-        Kesten(start=1.0, first_step=4.0, target=0.8, within=WIDE, stop=Stop(trials=3000)),
+        UpDown(start=1.0, steps=(0.1,), within=WIDE, stop=TrackEnd(trials=3000), down=2),
+        UpDown(start=1.0, steps=(0.1,), within=WIDE, stop=TrackEnd(trials=3000), ratio=3.0),
+        Kesten(start=1.0, first_step=4.0, target=0.8, within=WIDE, stop=TrackEnd(trials=3000)),
     ],
 )
 def test_tracks_come_to_their_target(rule: UpDown | Kesten) -> None:
     """The level with that share on a cumulative normal: small steps stay near it."""
     draws, answers = np.random.default_rng(17).random(600), list[bool]()
     for value in draws:
-        level = track(rule, answers).next_level
+        level = track_after(rule, answers).next_level
         assert level is not None
         answers.append(bool(value < norm.cdf(level)))
-    assert np.mean(track(rule, answers).levels[200:]) == pytest.approx(norm.ppf(rule.target), abs=0.15)
+    assert np.mean(track_after(rule, answers).levels[200:]) == pytest.approx(norm.ppf(rule.target), abs=0.15)
 
 
 # the posterior
 
-KNOWN = posterior.grid(
+KNOWN = posterior.parameter_grid(
     stimuli=np.linspace(-4, 4, 9),
     thresholds=np.linspace(-3, 3, 7),
     widths=np.array([1.0, 3.0, 5.0]),
@@ -140,10 +140,10 @@ KNOWN = posterior.grid(
 some_trials = some.lists(some.tuples(some.integers(0, 8), some.booleans()), max_size=12)
 
 
-def after(trials: list[tuple[int, bool]]) -> posterior.Floats:
+def after(trials: list[tuple[int, bool]]) -> posterior.Shares:
     known = KNOWN.start()
     for stimulus, right in trials:
-        known = posterior.updated(KNOWN, known, stimulus, right)
+        known = posterior.posterior_after(KNOWN, known, stimulus, right)
     return known
 
 
@@ -167,21 +167,21 @@ def test_a_posterior_is_prior_times_likelihood(trials: list[tuple[int, bool]]) -
 
 @given(some_trials, some.sampled_from([("threshold",), ("width",), ("threshold", "width")]))
 def test_the_variance_rule_takes_what_leaves_the_least_variance(
-    trials: list[tuple[int, bool]], wanted: tuple[posterior.Wanted, ...]
+    trials: list[tuple[int, bool]], wanted: tuple[posterior.WantedParameter, ...]
 ) -> None:
     known, rule = after(trials), posterior.variance_rule(KNOWN, wanted)
     left = [sum(variance_left(known, stimulus, name) for name in wanted) for stimulus in range(9)]
     gains = rule.gains(known)
     assert gains - gains[0] == pytest.approx(left[0] - np.array(left), abs=1e-9)
-    assert left[int(posterior.best(gains))] == pytest.approx(min(left), abs=1e-9)
+    assert left[int(posterior.best_stimulus(gains))] == pytest.approx(min(left), abs=1e-9)
 
 
-def variance_left(known: np.ndarray, stimulus: int, wanted: posterior.Wanted) -> float:
+def variance_left(known: np.ndarray, stimulus: int, wanted: posterior.WantedParameter) -> float:
     """What is expected after an answer, in units of the prior's variance."""
     values = np.broadcast_to(KNOWN.values(wanted)[:, None], known.shape)
     prior = KNOWN.start()
     scale = (prior * values**2).sum() - (prior * values).sum() ** 2
-    share = KNOWN.chance + KNOWN.slack * KNOWN.unscaled[stimulus][:, None]
+    share = KNOWN.chance + KNOWN.slack * KNOWN.felt[stimulus][:, None]
     left = 0.0
     for likely in (known * share, known * (1 - share)):
         weight = likely.sum()
@@ -197,9 +197,9 @@ def test_the_entropy_rule_takes_what_tells_most(trials: list[tuple[int, bool]]) 
     for stimulus in (0, 4, 8):
         left = 0.0
         for right in (True, False):
-            share = KNOWN.chance + KNOWN.slack * KNOWN.unscaled[stimulus][:, None]
+            share = KNOWN.chance + KNOWN.slack * KNOWN.felt[stimulus][:, None]
             weight = (known * (share if right else 1 - share)).sum()
-            left += weight * entropy(posterior.updated(KNOWN, known, stimulus, right))
+            left += weight * entropy(posterior.posterior_after(KNOWN, known, stimulus, right))
         assert told[stimulus] == pytest.approx(entropy(known) - left, abs=1e-9)
 
 
@@ -213,7 +213,7 @@ def test_many_observers_at_once_are_each_their_own() -> None:
     stimuli, right = draws.integers(0, 9, (6, 4)), draws.random((6, 4)) < 0.5
     rule, many = posterior.variance_rule(KNOWN), np.broadcast_to(KNOWN.start(), (4, *KNOWN.shape))
     for stimulus, answer in zip(stimuli, right, strict=True):
-        many = posterior.updated(KNOWN, many, stimulus, answer)
+        many = posterior.posterior_after(KNOWN, many, stimulus, answer)
     for person in range(4):
         own = after([(int(one), bool(said)) for one, said in zip(stimuli[:, person], right[:, person], strict=True)])
         assert many[person] == pytest.approx(own, rel=1e-12)
@@ -221,14 +221,14 @@ def test_many_observers_at_once_are_each_their_own() -> None:
 
 
 def test_of_stimuli_that_are_alike_the_first_is_taken() -> None:
-    assert posterior.best(np.array([[1.0, 2.0, 2.0 + 1e-13], [3.0, 1.0, 0.0]])).tolist() == [1, 0]
-    assert posterior.best(np.zeros(4)) == 0
+    assert posterior.best_stimulus(np.array([[1.0, 2.0, 2.0 + 1e-13], [3.0, 1.0, 0.0]])).tolist() == [1, 0]
+    assert posterior.best_stimulus(np.zeros(4)) == 0
 
 
 @pytest.mark.parametrize("prior", [np.ones((7, 3)), -np.ones((7, 3, 2, 3)), np.zeros((7, 3, 2, 3))])
 def test_a_prior_that_is_none_is_refused(prior: np.ndarray) -> None:
     with pytest.raises(ValueError, match="prior: it must have the shape"):
-        posterior.grid(
+        posterior.parameter_grid(
             stimuli=KNOWN.stimuli,
             thresholds=KNOWN.thresholds,
             widths=KNOWN.widths,

@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import norm
 
 from analysis.psychometric.fit import PsychometricFit, psychometric_fit
-from analysis.psychometric.pooling import difference, pooled
+from analysis.psychometric.pooling import difference, pooled_group
 
 GOLDEN: list[dict[str, Any]] = json.loads((Path(__file__).parent / "golden" / "psignifit.json").read_text())
 LEVELS, TRIALS = np.array([6.0, 8.0, 10.0, 12.0, 14.0]), np.full(5, 20)
@@ -130,7 +130,7 @@ def test_what_cannot_be_fitted_is_refused_by_name(change: dict[str, Any], said: 
 def test_a_group_draws_its_people_towards_each_other_by_how_little_they_say() -> None:
     stream = np.random.default_rng(4)
     sure, vague = [stream.normal(10 + place, 0.2, 2000) for place in range(5)], stream.normal(30, 12, 2000)
-    group = pooled([*sure, vague])
+    group = pooled_group([*sure, vague])
     assert group.people[0].median == pytest.approx(10, abs=0.2)
     assert group.people[5].median < 20
     assert group.mean.low < 12 < group.mean.high

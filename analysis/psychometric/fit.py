@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import xlogy
 
-from analysis.psychometric.grid import NAMES, Counts, Posterior, posterior
+from analysis.psychometric.grid import NAMES, LevelCounts, Posterior, posterior
 from analysis.psychometric.priors import Priors, default_priors
 from analysis.stats.arrays import FloatArray, numbers
 from analysis.stats.frames import Result
-from experiments.design.procedures.psychometric import Shape, unscaled
+from experiments.design.procedures.psychometric import Shape, share_felt
 
-DRAWS = 4000
+_DRAWS = 4000
 """Draws from the posterior, for what follows from several parameters at once."""
 _MOST_TRIALS = 1e6
 _ALPHAS = 1.1347241384015194 ** -np.arange(1.0, 6.0)
 """Their multiples fill a cube of five dimensions evenly: the base is the root of x^6 = x + 1."""
 
-Place = Literal["within", "below", "above", "unknown"]
+ThresholdPlace = Literal["within", "below", "above", "unknown"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate(Result):
+class Credible(Result):
     """The posterior's median and mean, and the interval that holds its middle `confidence`."""
 
     median: float
@@ -58,18 +58,18 @@ class PsychometricFit(Result):
     shape: Shape
     log: bool
     confidence: float
-    threshold: Estimate
-    width: Estimate
-    jnd: Estimate
-    slope: Estimate
-    lapse: Estimate
-    guess: Estimate
-    overdispersion: Estimate
+    threshold: Credible
+    width: Credible
+    jnd: Credible
+    slope: Credible
+    lapse: Credible
+    guess: Credible
+    overdispersion: Credible
     goodness: Goodness
-    where: Place
+    where: ThresholdPlace
     reason: str | None = None
     draws: FloatArray = field(repr=False, compare=False, metadata={"written": False})
-    """(DRAWS, 5): threshold, width, lapse, guess and overdispersion on the axis of the fit."""
+    """(_DRAWS, 5): threshold, width, lapse, guess and overdispersion on the axis of the fit."""
 
     def curve(self, levels: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The share at levels (m,): its posterior median, and the band that holds its middle `confidence`."""
@@ -78,7 +78,7 @@ class PsychometricFit(Result):
         low, middle, high = np.quantile(shares, [tail, 0.5, 1 - tail], axis=0)
         return middle, low, high
 
-    def level_at(self, share: float) -> Estimate:
+    def level_at(self, share: float) -> Credible:
         """The level at which F is `share`, above 0 and below 1: 0.5 is the threshold.
 
         `ValueError`: a share that no function reaches.
@@ -125,7 +125,7 @@ def psychometric_fit(
     return _fit(counts, draws, log=log, confidence=confidence)
 
 
-def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape, *, log: bool) -> Counts:
+def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape, *, log: bool) -> LevelCounts:
     given = {"levels": numbers(levels, "levels"), "right": numbers(right, "right"), "trials": numbers(trials, "trials")}
     sizes = {name: array.shape for name, array in given.items()}
     if given["levels"].ndim != 1 or len(set(sizes.values())) > 1:
@@ -145,7 +145,7 @@ def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape
     kept = given["trials"] > 0
     if np.unique(given["levels"][kept]).size < 2:
         raise ValueError("levels must hold at least two different ones with trials")
-    return Counts(
+    return LevelCounts(
         levels=_axis(given["levels"][kept], log=log),
         right=given["right"][kept],
         trials=given["trials"][kept],
@@ -164,22 +164,22 @@ def _back(*, log: bool) -> Callable[[FloatArray], FloatArray]:
 def _draws(found: Posterior) -> FloatArray:
     """Draws of the five parameters, the same each time: evenly through the weights, and evenly within the cells."""
     passed = np.cumsum(found.weights.ravel())
-    places = np.searchsorted(passed, (np.arange(DRAWS) + 0.5) / DRAWS * passed[-1])
+    places = np.searchsorted(passed, (np.arange(_DRAWS) + 0.5) / _DRAWS * passed[-1])
     cells = np.unravel_index(np.minimum(places, passed.size - 1), found.weights.shape)
-    even = (0.5 + np.outer(_ALPHAS, np.arange(DRAWS))) % 1
+    even = (0.5 + np.outer(_ALPHAS, np.arange(_DRAWS))) % 1
     columns = [
         axis.left[cell] + axis.cells[cell] * some for axis, cell, some in zip(found.axes, cells, even, strict=True)
     ]
     return np.stack(columns, axis=-1)
 
 
-def _fit(counts: Counts, draws: FloatArray, *, log: bool, confidence: float) -> PsychometricFit:
+def _fit(counts: LevelCounts, draws: FloatArray, *, log: bool, confidence: float) -> PsychometricFit:
     by_name = dict(zip(NAMES, draws.T, strict=True))
     back, width = _back(log=log), by_name["width"]
     quarter = np.abs(_at(draws, 0.75, counts.shape) - _at(draws, 0.25, counts.shape)) / 2
     slack = 1 - by_name["guess"] - by_name["lapse"]
     step = 1e-4 * width
-    rise = unscaled(by_name["threshold"] + step, by_name["threshold"], width, counts.shape) - unscaled(
+    rise = share_felt(by_name["threshold"] + step, by_name["threshold"], width, counts.shape) - share_felt(
         by_name["threshold"] - step, by_name["threshold"], width, counts.shape
     )
     where, reason = _where(counts, by_name["threshold"], back)
@@ -200,17 +200,17 @@ def _fit(counts: Counts, draws: FloatArray, *, log: bool, confidence: float) -> 
     )
 
 
-def _estimate(values: FloatArray, confidence: float, back: Callable[[FloatArray], FloatArray] = np.asarray) -> Estimate:
+def _estimate(values: FloatArray, confidence: float, back: Callable[[FloatArray], FloatArray] = np.asarray) -> Credible:
     tail = (1 - confidence) / 2
     low, middle, high = back(np.quantile(values, [tail, 0.5, 1 - tail]))
-    return Estimate(
+    return Credible(
         median=float(middle), mean=float(back(values.mean(keepdims=True))[0]), low=float(low), high=float(high)
     )
 
 
 def _where(
-    counts: Counts, thresholds: FloatArray, back: Callable[[FloatArray], FloatArray]
-) -> tuple[Place, str | None]:
+    counts: LevelCounts, thresholds: FloatArray, back: Callable[[FloatArray], FloatArray]
+) -> tuple[ThresholdPlace, str | None]:
     """Whether there is a threshold among the levels, and if not, what can be said."""
     low, high = float(counts.levels.min()), float(counts.levels.max())
     below, above = float((thresholds < low).mean()), float((thresholds > high).mean())
@@ -232,17 +232,17 @@ def _at(draws: FloatArray, share: float, shape: Shape) -> FloatArray:
     low, high = -20.0, 20.0
     for _ in range(60):
         middle = (low + high) / 2
-        low, high = (middle, high) if unscaled(middle, 0.0, 1.0, shape) < share else (low, middle)
+        low, high = (middle, high) if share_felt(middle, 0.0, 1.0, shape) < share else (low, middle)
     return np.asarray(draws[:, 0] + draws[:, 1] * (low + high) / 2)
 
 
 def _shares(draws: FloatArray, levels: FloatArray, shape: Shape) -> FloatArray:
     """(draws, levels)"""
-    felt = unscaled(levels, draws[:, :1], draws[:, 1:2], shape)
+    felt = share_felt(levels, draws[:, :1], draws[:, 1:2], shape)
     return np.asarray(draws[:, 3:4] + (1 - draws[:, 3:4] - draws[:, 2:3]) * felt)
 
 
-def _goodness(counts: Counts, draws: FloatArray) -> Goodness:
+def _goodness(counts: LevelCounts, draws: FloatArray) -> Goodness:
     """Posterior predictive: each draw's deviance from the data against that from data drawn from it (Gelman 1996)."""
     some, stream = draws[::4], np.random.default_rng(1996)
     shares = np.clip(_shares(some, counts.levels, counts.shape), 1e-12, 1 - 1e-12)

@@ -13,7 +13,7 @@ from scipy.special import betaln, xlog1py, xlogy
 
 from analysis.psychometric.priors import Priors
 from analysis.stats.arrays import FloatArray
-from experiments.design.procedures.psychometric import Shape, unscaled
+from experiments.design.procedures.psychometric import Shape, share_felt
 
 _NODES = 4096
 """Shares at which a level's likelihood is tabulated, evenly in arcsin √p, where it is smooth: an error below 1e-5."""
@@ -26,7 +26,7 @@ NAMES = ("threshold", "width", "lapse", "guess", "overdispersion")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Counts:
+class LevelCounts:
     """Right answers (k,) of so many trials (k,) at levels (k,), as they are fitted: levels are logarithms already."""
 
     levels: FloatArray
@@ -67,7 +67,7 @@ class Axis:
         return np.asarray(self.low + np.cumsum(self.cells) - self.cells)
 
 
-def posterior(counts: Counts, priors: Priors, fixed: dict[str, float]) -> Posterior:
+def posterior(counts: LevelCounts, priors: Priors, fixed: dict[str, float]) -> Posterior:
     """The posterior, found on a coarse grid over all that the priors allow and computed on a fine one around it.
 
     `fixed` has the values of parameters that are known: a guess rate of 0.5, an overdispersion of 0.
@@ -107,7 +107,7 @@ def _around(axis: Axis, weights: FloatArray) -> tuple[float, float]:
     return float(edges[max(first - 1, 0)]), float(edges[min(last + 2, edges.size - 1)])
 
 
-def _on(counts: Counts, priors: Priors, axes: tuple[Axis, ...]) -> Posterior:
+def _on(counts: LevelCounts, priors: Priors, axes: tuple[Axis, ...]) -> Posterior:
     log_density = _log_likelihood(counts, axes)
     for place, (name, axis) in enumerate(zip(NAMES, axes, strict=True)):
         if axis.values.size > 1:
@@ -118,13 +118,13 @@ def _on(counts: Counts, priors: Priors, axes: tuple[Axis, ...]) -> Posterior:
     return Posterior(axes=axes, weights=weights / weights.sum())
 
 
-def _log_likelihood(counts: Counts, axes: tuple[Axis, ...]) -> FloatArray:
+def _log_likelihood(counts: LevelCounts, axes: tuple[Axis, ...]) -> FloatArray:
     """Of the shape of the axes; the number of orders of the answers, which is the same everywhere, is left out."""
     thresholds, widths, lapses, guesses, spreads = (axis.values for axis in axes)
     total = np.zeros([axis.size for axis in (thresholds, widths, lapses, guesses, spreads)])
     slack = 1 - lapses[:, None] - guesses
     for level, right, trials in zip(counts.levels, counts.right, counts.trials, strict=True):
-        felt = unscaled(level, thresholds[:, None], widths, counts.shape)
+        felt = share_felt(level, thresholds[:, None], widths, counts.shape)
         share = guesses + slack * felt[..., None, None]
         at = np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0))) * ((_NODES - 1) / (np.pi / 2))
         below = np.minimum(at.astype(np.intp), _NODES - 2)

@@ -15,7 +15,7 @@ from scipy.special import log_expit, log_ndtr, logsumexp, ndtri
 from analysis.stats.arrays import FloatArray, numbers
 from analysis.stats.frames import Result
 
-Model = Literal["bradley-terry", "thurstone"]
+PairModel = Literal["bradley-terry", "thurstone"]
 _LEAST = -40.0
 """A log probability below which nothing more is told apart."""
 _STEP, _POLISHED = 1e-3, 20
@@ -37,7 +37,7 @@ class ItemScore(Result):
 class PairedScores(Result):
     """The scores of all items in their order; none for a `reason`. `tie`: the tie parameter, 0 without ties."""
 
-    model: Model
+    model: PairModel
     scores: tuple[ItemScore, ...] = ()
     tie: float = 0.0
     log_likelihood: float | None = None
@@ -61,7 +61,7 @@ def paired_scores(
     wins: ArrayLike,
     ties: ArrayLike | None = None,
     *,
-    model: Model = "bradley-terry",
+    model: PairModel = "bradley-terry",
     confidence: float = 0.95,
 ) -> PairedScores:
     """Scores by maximum likelihood from `wins` (n, n): how often the row was chosen over the column.
@@ -154,7 +154,7 @@ def _basis(n: int) -> FloatArray:
     return np.asarray(np.linalg.qr(np.eye(n) - 1 / n)[0][:, : n - 1])
 
 
-def _log_likelihood(at: FloatArray, won: FloatArray, tied: FloatArray, model: Model) -> float:
+def _log_likelihood(at: FloatArray, won: FloatArray, tied: FloatArray, model: PairModel) -> float:
     n = len(won)
     scores = _basis(n) @ at[: n - 1]
     difference = scores[:, None] - scores

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.psychometric.fit import Estimate
+from analysis.psychometric.fit import Credible
 from analysis.stats.arrays import FloatArray
 from analysis.stats.frames import Result
 
@@ -24,18 +24,18 @@ _CELLS, _MEANS, _SPREADS = 240, 80, 40
 class Group(Result):
     """The group's mean and standard deviation, and the people's own values in their order."""
 
-    mean: Estimate
-    sd: Estimate
-    people: tuple[Estimate, ...]
+    mean: Credible
+    sd: Credible
+    people: tuple[Credible, ...]
 
 
-def pooled(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group:
+def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group:
     """The group behind draws (n,) of each person's value, from fits whose priors were flat where the draws are.
 
     `ValueError`: fewer than two people.
 
     >>> own = [np.random.default_rng(i).normal(10 + i, 1, 500) for i in range(4)]
-    >>> found = pooled(own)
+    >>> found = pooled_group(own)
     >>> round(found.mean.median, 1), bool(found.people[0].median > np.median(own[0]))
     (11.4, True)
     """
@@ -74,9 +74,9 @@ def _histograms(draws: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     return (edges[1:] + edges[:-1]) / 2, own
 
 
-def _estimate(values: FloatArray, weights: FloatArray, confidence: float) -> Estimate:
+def _estimate(values: FloatArray, weights: FloatArray, confidence: float) -> Credible:
     weights = weights / weights.sum()
     passed = np.cumsum(weights) - weights / 2
     tail = (1 - confidence) / 2
     low, median, high = np.interp([tail, 0.5, 1 - tail], passed, values)
-    return Estimate(median=float(median), mean=float(weights @ values), low=float(low), high=float(high))
+    return Credible(median=float(median), mean=float(weights @ values), low=float(low), high=float(high))

@@ -13,7 +13,7 @@ from analysis.stats.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plateau:
+class PlateauPrior:
     """As likely everywhere from `flat_from` to `flat_to`, with a cosine's fall to nothing at `low` and `high`."""
 
     low: float
@@ -30,7 +30,7 @@ class Plateau:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rate:
+class RatePrior:
     """A rate with the density of Beta(1, `against`): the less likely the larger, up to `most`."""
 
     against: float = 10.0
@@ -45,11 +45,11 @@ class Rate:
 class Priors:
     """Of threshold and width, in the unit of the levels (of a fit on a logarithmic axis: of their logarithms)."""
 
-    threshold: Plateau
-    width: Plateau
-    lapse: Rate = Rate()
-    guess: Rate = Rate()
-    overdispersion: Rate = Rate(most=0.999)
+    threshold: PlateauPrior
+    width: PlateauPrior
+    lapse: RatePrior = RatePrior()
+    guess: RatePrior = RatePrior()
+    overdispersion: RatePrior = RatePrior(most=0.999)
 
 
 def default_priors(levels: FloatArray) -> Priors:
@@ -61,6 +61,6 @@ def default_priors(levels: FloatArray) -> Priors:
     span, step = float(different[-1] - different[0]), float(np.min(np.diff(different)))
     low, high = float(different[0]), float(different[-1])
     return Priors(
-        threshold=Plateau(low=low - span / 2, flat_from=low, flat_to=high, high=high + span / 2),
-        width=Plateau(low=step, flat_from=2 * step, flat_to=span, high=3 * span),
+        threshold=PlateauPrior(low=low - span / 2, flat_from=low, flat_to=high, high=high + span / 2),
+        width=PlateauPrior(low=step, flat_from=2 * step, flat_to=span, high=3 * span),
     )

@@ -19,57 +19,57 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import entr
 
-from experiments.design.procedures.psychometric import Floats, Shape, unscaled
+from experiments.design.procedures.psychometric import Shape, Shares, share_felt
 
-Wanted = Literal["threshold", "width"]
+WantedParameter = Literal["threshold", "width"]
 _ALIKE = 1e-9
 """Stimuli whose gains differ relatively by less are alike: the first is taken on every machine."""
 _LEAST = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Grid:
+class ParameterGrid:
     """The parameters' values with their prior, and the stimuli.
 
-    `prior` has the shape (thresholds, widths, lapses, guesses) and sums to 1. `unscaled` is F, of the shape
+    `prior` has the shape (thresholds, widths, lapses, guesses) and sums to 1. `felt` is F, of the shape
     (stimuli, thresholds × widths); `chance` and `slack` are g and 1 - g - l, of lapses × guesses.
     """
 
-    stimuli: Floats
-    thresholds: Floats
-    widths: Floats
-    lapses: Floats
-    guesses: Floats
-    prior: Floats
-    unscaled: Floats
-    chance: Floats
-    slack: Floats
+    stimuli: Shares
+    thresholds: Shares
+    widths: Shares
+    lapses: Shares
+    guesses: Shares
+    prior: Shares
+    felt: Shares
+    chance: Shares
+    slack: Shares
 
     @property
     def shape(self) -> tuple[int, int]:
         """The posterior's axes: thresholds × widths, lapses × guesses."""
-        return self.unscaled.shape[1], len(self.slack)
+        return self.felt.shape[1], len(self.slack)
 
-    def values(self, wanted: Wanted) -> Floats:
+    def values(self, wanted: WantedParameter) -> Shares:
         """A parameter's value at each place of thresholds × widths."""
         grid = np.meshgrid(self.thresholds, self.widths, indexing="ij")
         return np.asarray(grid[wanted == "width"]).ravel()
 
-    def start(self) -> Floats:
+    def start(self) -> Shares:
         """The prior, with a posterior's axes."""
         return self.prior.reshape(self.shape)
 
 
-def grid(
+def parameter_grid(
     *,
-    stimuli: Floats,
-    thresholds: Floats,
-    widths: Floats,
-    lapses: Floats,
-    guesses: Floats,
-    prior: Floats | None = None,
+    stimuli: Shares,
+    thresholds: Shares,
+    widths: Shares,
+    lapses: Shares,
+    guesses: Shares,
+    prior: Shares | None = None,
     shape: Shape = "normal",
-) -> Grid:
+) -> ParameterGrid:
     """A grid; without a prior every place has the same. `ValueError`: a prior of another shape, or of nothing."""
     sizes = (len(thresholds), len(widths), len(lapses), len(guesses))
     weights = np.ones(sizes) if prior is None else np.asarray(prior, float)
@@ -77,24 +77,24 @@ def grid(
         raise ValueError(f"prior: it must have the shape {sizes}, no value below 0, and one above")
     places = np.meshgrid(thresholds, widths, indexing="ij")
     lapse, guess = (axis.ravel() for axis in np.meshgrid(lapses, guesses, indexing="ij"))
-    return Grid(
+    return ParameterGrid(
         stimuli=np.asarray(stimuli, float),
         thresholds=np.asarray(thresholds, float),
         widths=np.asarray(widths, float),
         lapses=np.asarray(lapses, float),
         guesses=np.asarray(guesses, float),
         prior=weights / weights.sum(),
-        unscaled=unscaled(np.asarray(stimuli, float)[:, None], places[0].ravel(), places[1].ravel(), shape),
+        felt=share_felt(np.asarray(stimuli, float)[:, None], places[0].ravel(), places[1].ravel(), shape),
         chance=guess,
         slack=1 - guess - lapse,
     )
 
 
-def updated(
-    known: Grid, posterior: Floats, stimulus: NDArray[np.intp] | int, right: NDArray[np.bool_] | bool
-) -> Floats:
+def posterior_after(
+    known: ParameterGrid, posterior: Shares, stimulus: NDArray[np.intp] | int, right: NDArray[np.bool_] | bool
+) -> Shares:
     """The posterior after an answer to a stimulus, given by its place. Axes in front: one stimulus and answer each."""
-    share = known.chance + known.slack * known.unscaled[stimulus][..., None]
+    share = known.chance + known.slack * known.felt[stimulus][..., None]
     likely = posterior * np.where(np.asarray(right)[..., None, None], share, 1 - share)
     total = likely.sum(axis=(-2, -1), keepdims=True)
     return likely / np.where(total > 0, total, 1.0)
@@ -109,11 +109,11 @@ class VarianceRule:
     and l. `matrix`: F, and F times each wanted t in units of its prior's standard deviation.
     """
 
-    known: Grid
-    values: Floats
-    matrix: Floats
+    known: ParameterGrid
+    values: Shares
+    matrix: Shares
 
-    def gains(self, posterior: Floats) -> Floats:
+    def gains(self, posterior: Shares) -> Shares:
         """What each stimulus is expected to take away, of the shape (..., stimuli)."""
         known = self.known
         felt, guessed = posterior @ known.slack, posterior @ known.chance
@@ -127,7 +127,7 @@ class VarianceRule:
         return np.asarray(taken.sum(axis=-2))
 
 
-def variance_rule(known: Grid, wanted: tuple[Wanted, ...] = ("threshold",)) -> VarianceRule:
+def variance_rule(known: ParameterGrid, wanted: tuple[WantedParameter, ...] = ("threshold",)) -> VarianceRule:
     """The rule for a grid."""
     weights = known.start().sum(-1)
     values = []
@@ -136,7 +136,7 @@ def variance_rule(known: Grid, wanted: tuple[Wanted, ...] = ("threshold",)) -> V
         mean = weights @ one
         sd = np.sqrt(weights @ (one - mean) ** 2)
         values.append((one - mean) / (sd if sd > 0 else 1.0))
-    parts = [known.unscaled, *(known.unscaled * one for one in values)]
+    parts = [known.felt, *(known.felt * one for one in values)]
     return VarianceRule(known, np.array(values), np.ascontiguousarray(np.concatenate(parts)))
 
 
@@ -144,30 +144,30 @@ def variance_rule(known: Grid, wanted: tuple[Wanted, ...] = ("threshold",)) -> V
 class EntropyRule:
     """The stimulus whose answer tells most: h(mean share) - mean h(share), h the entropy of a yes or no."""
 
-    known: Grid
-    doubt: Floats
+    known: ParameterGrid
+    doubt: Shares
     """h(P) at each place of the grid, of the shape (stimuli, thresholds × widths × lapses × guesses)."""
 
-    def gains(self, posterior: Floats) -> Floats:
+    def gains(self, posterior: Shares) -> Shares:
         """What each answer is expected to tell, in nats, of the shape (..., stimuli)."""
         known = self.known
         felt = posterior @ known.slack
-        right = (posterior @ known.chance).sum(-1)[..., None] + felt @ known.unscaled.T
+        right = (posterior @ known.chance).sum(-1)[..., None] + felt @ known.felt.T
         flat = posterior.reshape(*posterior.shape[:-2], -1)
         return np.asarray(_doubt(right) - flat @ self.doubt.T)
 
 
-def entropy_rule(known: Grid) -> EntropyRule:
+def entropy_rule(known: ParameterGrid) -> EntropyRule:
     """The rule for a grid."""
-    share = known.chance + known.slack * known.unscaled[..., None]
+    share = known.chance + known.slack * known.felt[..., None]
     return EntropyRule(known, np.ascontiguousarray(_doubt(share).reshape(len(known.stimuli), -1)))
 
 
-def _doubt(share: Floats) -> Floats:
+def _doubt(share: Shares) -> Shares:
     return np.asarray(entr(share) + entr(1 - share))
 
 
-def best(gains: Floats) -> NDArray[np.intp]:
+def best_stimulus(gains: Shares) -> NDArray[np.intp]:
     """The place of the stimulus that gains most, the first of those that are alike."""
     most = gains.max(axis=-1, keepdims=True)
     spread = most - gains.min(axis=-1, keepdims=True)

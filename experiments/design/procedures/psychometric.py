@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import expit, ndtr, ndtri
 
-Floats = NDArray[np.float64]
+Shares = NDArray[np.float64]
 Shape = Literal["normal", "logistic", "gumbel", "reversed-gumbel"]
 
 TAIL = 0.05
@@ -26,12 +26,12 @@ _GUMBEL = log(-log(TAIL)) - log(-log(1 - TAIL))
 _HALF = log(log(2))
 
 
-def unscaled(x: ArrayLike, threshold: ArrayLike, width: ArrayLike, shape: Shape = "normal") -> Floats:
+def share_felt(x: ArrayLike, threshold: ArrayLike, width: ArrayLike, shape: Shape = "normal") -> Shares:
     """F at x; all arrays are broadcast against each other. `width` is above 0.
 
-    >>> unscaled([8.0, 10.0, 12.0], 10.0, 4.0).round(3).tolist()
+    >>> share_felt([8.0, 10.0, 12.0], 10.0, 4.0).round(3).tolist()
     [0.05, 0.5, 0.95]
-    >>> unscaled(10.0, 10.0, 4.0, "gumbel").round(3).tolist()
+    >>> share_felt(10.0, 10.0, 4.0, "gumbel").round(3).tolist()
     0.5
     """
     z = (np.asarray(x, float) - np.asarray(threshold, float)) / np.asarray(width, float)

@@ -16,7 +16,7 @@ _LONG = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Range:
+class LevelRange:
     """The levels that a track may take: from `low` to `high`, on a grid of `grain` from `low` (0: any).
 
     With `factors` a step multiplies the level, else it is added. `easier` is 1 where a higher level is easier, else -1.
@@ -41,7 +41,7 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stop:
+class TrackEnd:
     """When a track is over: after so many trials or reversals, whichever comes first; 0 is no limit."""
 
     trials: int = 0
@@ -62,8 +62,8 @@ class UpDown:
 
     start: float
     steps: tuple[float, ...]
-    within: Range
-    stop: Stop
+    within: LevelRange
+    stop: TrackEnd
     up: int = 1
     down: int = 1
     ratio: float = 1.0
@@ -72,7 +72,7 @@ class UpDown:
     def target(self) -> float:
         """The share of right answers at which steps up and down balance: between 0 and 1.
 
-        >>> rule = dict(start=8.0, steps=(1.0,), within=Range(low=0, high=9), stop=Stop(trials=40))
+        >>> rule = dict(start=8.0, steps=(1.0,), within=LevelRange(low=0, high=9), stop=TrackEnd(trials=40))
         >>> round(UpDown(down=3, **rule).target, 4), round(UpDown(ratio=3.0, **rule).target, 4)
         (0.7937, 0.75)
         """
@@ -94,12 +94,12 @@ class Kesten:
     start: float
     first_step: float
     target: float
-    within: Range
-    stop: Stop
+    within: LevelRange
+    stop: TrackEnd
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Track:
+class TrackState:
     """Where a track stands: the level of the next trial, `None` when it is over.
 
     `levels` are those that the answers so far called for, and `reversals` those at which the direction changed.
@@ -122,12 +122,12 @@ class Track:
         return sum(counted) / len(counted) if counted else None
 
 
-def track(rule: UpDown | Kesten, answers: Iterable[bool]) -> Track:
+def track_after(rule: UpDown | Kesten, answers: Iterable[bool]) -> TrackState:
     """Where a track stands after these answers, right or not.
 
-    >>> rule = UpDown(start=8.0, steps=(2.0, 1.0), within=Range(low=0, high=9), stop=Stop(reversals=2))
-    >>> track(rule, [True, True, False])
-    Track(next_level=5.0, levels=(8.0, 6.0, 4.0), reversals=(4.0,), at_edge=False)
+    >>> rule = UpDown(start=8.0, steps=(2.0, 1.0), within=LevelRange(low=0, high=9), stop=TrackEnd(reversals=2))
+    >>> track_after(rule, [True, True, False])
+    TrackState(next_level=5.0, levels=(8.0, 6.0, 4.0), reversals=(4.0,), at_edge=False)
     """
     walk = _Walk(rule.within.kept(rule.start))
     for right in answers:
@@ -137,7 +137,7 @@ def track(rule: UpDown | Kesten, answers: Iterable[bool]) -> Track:
         step = walk.up_down(rule, right=right) if isinstance(rule, UpDown) else walk.kesten(rule, right=right)
         walk.go(rule.within, step)
     over = rule.stop.reached(len(walk.levels), len(walk.reversals))
-    return Track(
+    return TrackState(
         next_level=None if over else walk.level,
         levels=tuple(walk.levels),
         reversals=tuple(walk.reversals),
@@ -181,7 +181,7 @@ class _Walk:
             self.reversals.append(self.level)
         self._heading = heading
 
-    def go(self, within: Range, taken: tuple[int, float]) -> None:
+    def go(self, within: LevelRange, taken: tuple[int, float]) -> None:
         """Take a step, as far as the range lets it."""
         heading, step = taken
         wanted = within.moved(self.level, step) if heading else self.level
