@@ -43,7 +43,7 @@ class RealClock:
 
     def utc(self) -> str:
         """Date and time in UTC."""
-        return _iso(datetime.now(UTC))
+        return utc_text(datetime.now(UTC))
 
     def sleep(self, seconds: float) -> None:
         """Wait for real."""
@@ -73,7 +73,7 @@ class VirtualClock:
 
     def utc(self) -> str:
         """The start plus the virtual seconds."""
-        return _iso(self._start + timedelta(seconds=self._elapsed_s))
+        return utc_text(self._start + timedelta(seconds=self._elapsed_s))
 
     def sleep(self, seconds: float) -> None:
         """Move on at once."""
@@ -93,7 +93,8 @@ class VirtualClock:
             self._start = max(self._start, stopped - timedelta(seconds=self._elapsed_s))
 
 
-def _iso(moment: datetime) -> str:
+def utc_text(moment: datetime) -> str:
+    """A moment of UTC as journals have it: ISO 8601, to the microsecond."""
     return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 

@@ -179,7 +179,7 @@ class Journal:
         if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
             raise JournalGone(self._gone)
         try:
-            line = _line({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record})
+            line = record_line({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record})
             storage.write_all(self._descriptor, line)
             storage.sync(self._descriptor)
         except (OSError, ValueError) as error:
@@ -258,7 +258,7 @@ def _held(path: Path, descriptor: int) -> int:
     return descriptor
 
 
-def _line(record: Mapping[str, object]) -> bytes:
+def record_line(record: Mapping[str, object]) -> bytes:
     """A record as JSON with its keys as they stand, so that the order of a design's factors is kept; no NaN."""
     return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
 
