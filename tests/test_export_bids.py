@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.archive import bids
+from analysis.archive import bids, placing
 from analysis.archive import bids_export as feature
 from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
@@ -424,7 +424,7 @@ def test_where_two_names_cannot_be_exchanged_the_old_one_is_set_aside_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     logs = write_study(tmp_path / "logs", 1)
-    monkeypatch.setattr(feature, "_exchange", lambda *_: False)
+    monkeypatch.setattr(placing, "_exchange", lambda *_: False)
     for _ in range(2):
         feature.export(logs, logs / "bids")
     assert sorted(path.name for path in logs.iterdir()) == ["bids", "sub-P01"]
@@ -444,7 +444,7 @@ def test_a_disk_that_fills_leaves_the_earlier_export(tmp_path: Path, monkeypatch
             raise OSError(28, "No space left on device")
         path.write_bytes(data)
 
-    monkeypatch.setattr(feature.storage, "write_whole", full)
+    monkeypatch.setattr(placing.storage, "write_whole", full)
     with pytest.raises(OSError, match="No space left"):
         feature.export(logs, logs / "bids")
     assert {path: data for path, data in tree(logs).items() if path.startswith(("bids", "."))} == {

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
-import shutil
-import sys
-import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.archive import bids
+from analysis.archive import bids, placing
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from experiments.config.door import load
 from experiments.load import load_study
-from experiments.record import storage
 from experiments.record.provenance import recoil_version
-from experiments.study import folders, register
+from experiments.study import register
 from experiments.study.folders import PlaceError
 from experiments.study.register import RegisterError
 from experiments.study.study import Member
-
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
-"""Linux's words for exchanging two names at once: renameat2(2)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,10 +62,11 @@ def export(
     mapping = load(ColumnMap, columns) if columns else None
     logs = read_logs([folder], track, mapping, include_synthetic=include_synthetic)
     refuse_nothing([folder], logs)
-    results = _results(folder, logs)
-    runs = bids.runs_of(logs, *logs.apart)
-    files = bids.data_set(runs, _members(results), _name(results), recoil_version(), free_text=free_text)
-    _put(target, files | _filled_in(earlier, files))
+    results = results_of(folder, logs)
+    runs, files = data_set_of(logs, members_of(results), name_of(results), free_text=free_text)
+    with placing.in_place(target) as part:
+        for path, data in (files | filled_in(earlier, files)).items():
+            placing.write_file(part, path, data)
     by_task = {task: [run for run in runs.runs if run.experiment == task] for task in runs.tasks}
     return Exported(
         out=str(out),
@@ -90,11 +82,19 @@ def export(
     )
 
 
+def data_set_of(
+    logs: Logs, members: Mapping[str, Member], name: str, *, free_text: bool = False
+) -> tuple[bids.Runs, dict[str, bytes]]:
+    """The runs in logs, of every kind of data that they hold, and the files of the data set that they make."""
+    runs = bids.runs_of(logs, *logs.apart)
+    return runs, bids.data_set(runs, members, name, recoil_version(), free_text=free_text)
+
+
 def _earlier(target: Path) -> Path | None:
     """An earlier export that is to be replaced, if there is one. `PlaceError` for anything else that is there."""
-    if not target.exists() or (target.is_dir() and not any(target.iterdir())):
+    if placing.is_free(target):
         return None
-    if not _is_export(target):
+    if not is_export(target):
         raise PlaceError(f"{target}: exists and is no data set that Recoil exported; choose another --out")
     paths = (path.relative_to(target).as_posix() for path in sorted(target.rglob("*")))
     foreign = [path for path in paths if not bids.is_ours(path)]
@@ -104,7 +104,7 @@ def _earlier(target: Path) -> Path | None:
     return target
 
 
-def _is_export(target: Path) -> bool:
+def is_export(target: Path) -> bool:
     generators = _read_json(target / bids.DESCRIPTION).get("GeneratedBy")
     if not isinstance(generators, list):
         return False
@@ -120,7 +120,7 @@ def _read_json(path: Path) -> dict[str, object]:
     return values if isinstance(values, dict) else {}
 
 
-def _results(folder: Path, logs: Logs) -> Path:
+def results_of(folder: Path, logs: Logs) -> Path:
     """The results folder whose logs these are. `PlaceError` if there are several: P01 here may not be P01 there."""
     files = [file for part in (logs, *logs.apart) for file in part.files]
     found = {file.parent.parent if file.parent.name.startswith("sub-") else folder for file in files}
@@ -130,7 +130,7 @@ def _results(folder: Path, logs: Logs) -> Path:
     return found.pop()
 
 
-def _members(results: Path) -> dict[str, Member]:
+def members_of(results: Path) -> dict[str, Member]:
     """What the register says of everyone."""
     found = register.read_register(results)
     if found.problem:
@@ -138,14 +138,14 @@ def _members(results: Path) -> dict[str, Member]:
     return found.members
 
 
-def _name(results: Path) -> str:
+def name_of(results: Path) -> str:
     """The title of the study whose logs these are; a plain name where there is no study."""
     here = Path(os.path.normpath(results.absolute()))
     study = next((one / "study.toml" for one in (here, here.parent) if (one / "study.toml").is_file()), None)
     return load_study(str(study))[0].title if study else "Psychophysics of a haptic gun"
 
 
-def _filled_in(earlier: Path | None, files: Mapping[str, bytes]) -> dict[str, bytes]:
+def filled_in(earlier: Path | None, files: Mapping[str, bytes]) -> dict[str, bytes]:
     """The JSON files that people have added keys of BIDS to, with these keys. A name that they gave is kept."""
     found = {}
     for path in (path for path in files if path.endswith(".json") and earlier):
@@ -154,41 +154,3 @@ def _filled_in(earlier: Path | None, files: Mapping[str, bytes]) -> dict[str, by
         if kept:
             found[path] = bids.json_bytes(ours | {key: theirs[key] for key in theirs if key in kept})
     return found
-
-
-def _put(target: Path, files: Mapping[str, bytes]) -> None:
-    """Write a folder beside `target` and put it in its place at once: whoever looks sees the old one or the new one."""
-    storage.make_folder(target.parent)
-    prefix = f".{target.name}.part-"
-    for left_over in (path for path in target.parent.iterdir() if path.name.startswith(prefix)):
-        shutil.rmtree(left_over, ignore_errors=True)  # of an export that was killed
-    part = Path(tempfile.mkdtemp(prefix=prefix, dir=target.parent))
-    try:
-        for path, data in files.items():
-            storage.make_folder((part / path).parent)
-            storage.write_whole(part / path, data)
-        _replace(target, part)
-        storage.sync_folder(target.parent)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-
-
-def _replace(target: Path, part: Path) -> None:
-    if target.exists() and not any(target.iterdir()):
-        target.rmdir()
-    if not target.exists():
-        part.rename(target)
-    elif not _exchange(target, part):  # in two steps: killed between them, the old one is there under another name
-        aside = folders.set_aside_file(target)
-        part.rename(target)
-        shutil.rmtree(aside)
-
-
-def _exchange(one: Path, other: Path) -> bool:
-    """Exchange two names at once; false where system or file system cannot."""
-    if sys.platform != "linux":
-        return False
-    with suppress(OSError, AttributeError):  # no such call in this C library
-        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
-        return bool(renameat2(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0)
-    return False

@@ -13,7 +13,9 @@ from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.audit.page import predictions
 from analysis.paper.audit.run import audit, load_paper_file
-from analysis.paper.paper import Prediction, load_paper
+from analysis.paper.paper import Paper, Prediction, load_paper
+from analysis.report.section import Section
+from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, Tell, unseen, untold
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
@@ -24,7 +26,7 @@ from analysis.summary.requests import Requests
 from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
-from analysis.summary.sections.sections import write_report
+from analysis.summary.sections.sections import STATISTICS, write_report
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
 from experiments.config.door import ConfigError, load
@@ -40,7 +42,9 @@ _PARTS = 4
 class Request:
     """What is asked for: the logs, where to write, and the files that say how to read and what to leave out.
 
-    `fits`: with the diffusion model fitted to response times.
+    `fits`: with the diffusion model fitted to response times. `title` of the report: what was read, unless given;
+    `extra` sections of it stand behind the results. Unless `against_frozen`, no deviation from a preregistration is
+    looked for.
     """
 
     paths: Sequence[Path]
@@ -52,6 +56,9 @@ class Request:
     fits: bool = False
     requests: Path | None = None
     include_synthetic: bool = False
+    title: str = ""
+    extra: tuple[Section, ...] = ()
+    against_frozen: bool = True
 
     @property
     def files(self) -> AnalysisFiles:
@@ -65,6 +72,8 @@ class Request:
 class _Asked:
     """The files of a request, read."""
 
+    published: Paper | None
+    mapping: ColumnMap | None
     rules: Rules | None
     requests: Requests | None
     codebook: remarks_coding.Codebook | None
@@ -89,41 +98,73 @@ def analyze(
 
     `PlaceError` if there is no usable log at all, with every reason.
     """
-    published = load_paper(request.paper) if request.paper else None
-    mapping = load(ColumnMap, request.columns) if request.columns else None
-    asked = _Asked(
+    files = _loaded(request)
+    logs = _usable(request, files, track)
+    with progress("analyze", _PARTS) as tell:
+        report, parts, edited = _analysis(request, files, logs, tell)
+        storage.make_folder(request.out)
+        write_report(request.out, report, tell)
+    for path, content in _tables(parts).items():
+        storage.make_folder((request.out / path).parent)
+        storage.write_whole(request.out / path, content)
+    return report.statistics, (*edited, *_said(logs, report.statistics))
+
+
+def result_files(request: Request, track: Track = iter) -> dict[str, bytes]:
+    """What `analyze` writes beside report and figures, by path: the statistics and the tables. Nothing is written."""
+    files = _loaded(request)
+    report, parts, _ = _analysis(request, files, _usable(request, files, track))
+    return {STATISTICS: as_json(report.statistics), **_tables(parts)}
+
+
+def _loaded(request: Request) -> _Asked:
+    return _Asked(
+        published=load_paper(request.paper) if request.paper else None,
+        mapping=load(ColumnMap, request.columns) if request.columns else None,
         rules=load(Rules, request.rules) if request.rules else None,
         requests=load(Requests, request.requests) if request.requests else None,
         codebook=remarks_coding.load_codebook(request.codebook) if request.codebook else None,
     )
-    logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
+
+
+def _usable(request: Request, files: _Asked, track: Track) -> Logs:
+    logs = read_logs(request.paths, track, files.mapping, include_synthetic=request.include_synthetic)
     refuse_nothing(request.paths, logs)
-    parts = (replace(logs, apart=()), *logs.apart)
-    with progress("analyze", _PARTS) as tell:
-        main = _analysed(parts[0], asked, request, tell)
-        others = [_analysed(part, asked, request, apart=True) for part in parts[1:]]
-        kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
-        statistics = replace(main.statistics, kept_apart=kept_apart or None)
-        frozen, edited = deviations(parts[0], request.files)
-        statistics = replace(statistics, preregistration=frozen or None)
-        storage.make_folder(request.out)
-        report = replace(
-            _told(main),
-            title=report_title(logs),
-            statistics=statistics,
-            problems=logs.problems,
-            remarks=logs.remarks,
-            comparison=None if published is None else compare(statistics, published, _predicted(request.paper)),
-            beside=tuple(main.tables),
-            provenance=provenance() | _read_by(request.columns, mapping),
-            apart=tuple(_told(one) for one in others),
-        )
-        write_report(request.out, report, tell)
-    _write_tables(request.out, main)
-    for one in others:
-        storage.make_folder(request.out / folder_of(one.logs.kind))
-        _write_tables(request.out / folder_of(one.logs.kind), one)
-    return statistics, (*edited, *_said(logs, statistics))
+    return logs
+
+
+def _analysis(
+    request: Request, files: _Asked, logs: Logs, tell: Tell = untold
+) -> tuple[ReportData, tuple[_Analysed, ...], tuple[str, ...]]:
+    """What a report tells of logs; each kind of data by itself, of which the first is the report's; what was edited."""
+    first = replace(logs, apart=())
+    main = _analysed(first, files, request, tell)
+    others = [_analysed(part, files, request, apart=True) for part in logs.apart]
+    kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
+    frozen, edited = deviations(first, request.files) if request.against_frozen else ((), ())
+    statistics = replace(main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None)
+    told = _told(main)
+    compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))
+    report = replace(
+        told,
+        title=request.title or report_title(logs),
+        statistics=statistics,
+        problems=logs.problems,
+        remarks=logs.remarks,
+        comparison=compared,
+        beside=tuple(main.tables),
+        provenance=provenance() | _read_by(request.columns, files.mapping),
+        extra=(*request.extra, *told.extra),
+        apart=tuple(_told(one) for one in others),
+    )
+    return report, (main, *others), edited
+
+
+def _tables(parts: Sequence[_Analysed]) -> dict[str, bytes]:
+    """The tables of results by path: those of data that are kept apart in folders of their own."""
+    first, *others = parts
+    apart = {f"{folder_of(one.logs.kind)}/{name}": data for one in others for name, data in one.tables.items()}
+    return {**first.tables, **apart}
 
 
 def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:
@@ -211,11 +252,6 @@ def _told(one: _Analysed) -> ReportData:
         members=dict(registered),
         analysed=who_is_analysed(one.statistics, one.logs),
     )
-
-
-def _write_tables(folder: Path, one: _Analysed) -> None:
-    for name, content in one.tables.items():
-        storage.write_whole(folder / name, content)
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
