@@ -13,7 +13,7 @@ import recoil
 from analysis.report.streams import forgive_streams
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.words import RecoilError, few_of_each
-from recoil.commands import guns, numbers, predictions, sessions
+from recoil.commands import archives, guns, numbers, predictions, sessions
 
 app = typer.Typer(
     name="recoil",
@@ -35,6 +35,7 @@ COMMANDS = (
     numbers.analyze,
     numbers.audit,
     numbers.grim,
+    archives.verify,
     predictions.power,
     predictions.design,
     guns.simulate,
@@ -63,7 +64,8 @@ def _about(
 
 for command in COMMANDS:
     app.command()(command)
-export_commands.command()(numbers.bids)
+export_commands.command()(archives.bids)
+export_commands.command()(archives.archive)
 app.add_typer(export_commands, name="export")
 app.add_typer(predictions.app, name="fit")
 

@@ -105,13 +105,14 @@ def _earlier(target: Path) -> Path | None:
 
 
 def is_export(target: Path) -> bool:
-    generators = _read_json(target / bids.DESCRIPTION).get("GeneratedBy")
+    """Whether a folder says of itself that Recoil exported it."""
+    generators = read_json(target / bids.DESCRIPTION).get("GeneratedBy")
     if not isinstance(generators, list):
         return False
     return any(isinstance(one, dict) and one.get("Name") == bids.GENERATOR for one in generators)
 
 
-def _read_json(path: Path) -> dict[str, object]:
+def read_json(path: Path) -> dict[str, object]:
     """What a JSON file holds; nothing if there is none."""
     try:
         values = json.loads(path.read_bytes())
@@ -149,7 +150,7 @@ def filled_in(earlier: Path | None, files: Mapping[str, bytes]) -> dict[str, byt
     """The JSON files that people have added keys of BIDS to, with these keys. A name that they gave is kept."""
     found = {}
     for path in (path for path in files if path.endswith(".json") and earlier):
-        ours, theirs = json.loads(files[path]), _read_json((earlier or Path()) / path)
+        ours, theirs = json.loads(files[path]), read_json((earlier or Path()) / path)
         kept = {key for key in theirs if key[:1].isupper()} - (set(ours) - {"Name"})
         if kept:
             found[path] = bids.json_bytes(ours | {key: theirs[key] for key in theirs if key in kept})

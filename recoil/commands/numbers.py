@@ -1,4 +1,4 @@
-"""Commands around numbers: reproduce, analyse, audit, simulate studies, export."""
+"""Commands around numbers: reproduce, analyse, audit."""
 
 from __future__ import annotations
 
@@ -87,38 +87,6 @@ def analyze(
         say(f"recoil: {line}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)
     raise end(exceptions=bool(said))
-
-
-def bids(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder that holds the logs.")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="BIDS", help="Folder for the data set; DIR/bids unless given.")
-    ] = None,
-    free_text: Annotated[
-        bool, typer.Option("--free-text", help="With comments and notes; they might say who someone is.")
-    ] = False,
-    columns: ColumnsOption = None,
-    include_synthetic: IncludeSyntheticOption = False,
-    as_json: AsJsonOption = False,
-) -> None:
-    """The logs as a BIDS data set of behavioural runs; an earlier export is replaced."""
-    from analysis.archive.bids_export import export as feature
-
-    done = feature(
-        folder,
-        out or folder / "bids",
-        free_text=free_text,
-        columns=columns,
-        include_synthetic=include_synthetic,
-        track=tracked,
-    )
-    for line in few_of_each(f"left out: {problem}" for problem in done.left_out):
-        say(f"recoil: {line}")
-    for remark in (*done.remarks, *done.begun):
-        say(f"recoil: {remark}")
-    counts = f"participants: {done.participants}, runs: {sum(done.runs.values())}, files: {done.files}"
-    show(done, f"BIDS data set: {done.out} ({counts})", as_json)
-    raise end(exceptions=bool(done.left_out or done.remarks or done.begun))
 
 
 def audit(

@@ -1,0 +1,264 @@
+"""`recoil export archive`: one folder to publish, whose tables and statistics are made from redacted journals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.archive import bids_export, contents, datapackage, manifest, pages, placing, redaction
+from analysis.archive.contents import CONTENTS, Entry, State
+from analysis.archive.datapackage import Resource
+from analysis.archive.making import (
+    ANALYSIS,
+    BIDS,
+    REQUESTS,
+    RESULTS,
+    RULES,
+    SETTINGS,
+    ArchiveSettings,
+    analysis_of,
+    bids_files,
+)
+from analysis.archive.pages import CITATION, ArchivedDesign
+from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
+from analysis.logs.journals import journal_of
+from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
+from analysis.report.serial import as_json
+from analysis.report.terminal import Progress, unseen
+from analysis.summary.analyze import analyze
+from experiments.config.door import checked_table, read_text
+from experiments.config.setup import GunConfig
+from experiments.rebuild import began_with, rebuild
+from experiments.record import design_table, journal
+from experiments.record.dictionary import design_dictionary
+from experiments.record.journal import Contents, JournalError
+from experiments.record.provenance import recoil_version
+from experiments.record.tables import DataKind
+from experiments.study.folders import PlaceError
+from experiments.study.register import REGISTER_FILE
+from experiments.study.study import Member
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArchiveRequest:
+    """The folder that holds a study's logs, where the archive goes, and what is to be in it.
+
+    `rules` and `requests` are the files that the analysis of the paper was made with.
+    """
+
+    folder: Path
+    out: Path
+    free_text: bool = False
+    include_synthetic: bool = False
+    rules: Path | None = None
+    requests: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Archived:
+    """Where an archive lies, the hash of its manifest, which vouches for all of it, and what there is to say."""
+
+    out: str
+    manifest_sha256: str
+    files: int
+    participants: int
+    runs: int
+    left_out: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """A run to archive: its journal and whose data it holds."""
+
+    path: Path
+    data: bytes = field(repr=False)
+    contents: Contents = field(repr=False)
+    kind: DataKind
+
+    @property
+    def code(self) -> str:
+        return self.contents.plan.participant_id
+
+
+def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = unseen) -> Archived:
+    """Write the archive of a study. Whoever looks sees no archive, or the whole.
+
+    `PlaceError` if no log is usable, if something is in the archive's place, or if that lies within the study;
+    `RegisterError` if the register cannot be trusted; `ConfigError` for a file that was given.
+    """
+    target = _free_target(request)
+    logs = read_logs([request.folder], track, include_synthetic=request.include_synthetic)
+    refuse_nothing([request.folder], logs)
+    results = bids_export.results_of(request.folder, logs)
+    members, title = bids_export.members_of(results), bids_export.name_of(results)
+    runs, unproven = _runs(logs)
+    if not runs:
+        reasons = map(str, (*logs.problems, *unproven))
+        raise PlaceError("\n".join([f"{request.folder}: no run has a journal that proves its table", *reasons]))
+    settings = ArchiveSettings(title=title, free_text=request.free_text, include_synthetic=request.include_synthetic)
+    given = _citation([request.folder, results, results.parent])
+    entries = [*_entries(runs), *contents.left_out(logs, members, unproven)]
+    with placing.in_place(target) as part:
+        _write_results(part, runs, members, free_text=request.free_text)
+        _write_analysis(part, request, settings, progress)
+        _write_bids(part, request, settings, results)
+        _write_pages(part, settings, entries, _designs(runs))
+        placing.write_file(part, CITATION, given or pages.citation(title, recoil_version()))
+        for frozen in _preregistrations([request.folder, results.parent]):
+            placing.write_file(part, f"preregistration/{frozen.name}", frozen.read_bytes())
+        _write_package(part, title, runs)
+        files = manifest.manifest_bytes(part)
+        placing.write_file(part, manifest.MANIFEST, files)
+    return Archived(
+        out=str(request.out),
+        manifest_sha256=manifest.read_manifest(target).sha256,
+        files=files.count(b"\n"),
+        participants=len({run.code for run in runs}),
+        runs=len(runs),
+        left_out=tuple(map(str, (*logs.problems, *unproven))),
+        remarks=(*map(str, logs.remarks), *map(str, logs.begun)),
+    )
+
+
+def _free_target(request: ArchiveRequest) -> Path:
+    """Where the archive goes. `PlaceError`: something is there, or it would be read as a part of the study."""
+    folder, target = request.folder, request.out.resolve()
+    if not folder.is_dir():
+        raise PlaceError(f"{folder}: no such folder; name the folder that holds the logs")
+    if target.is_relative_to(folder.resolve()):
+        raise PlaceError(
+            f"{request.out}: lies in {folder}, whose logs would then be read twice; choose an --out beside it"
+        )
+    if not placing.is_free(target):
+        raise PlaceError(
+            f"{request.out}: is there already, and no archive is overwritten; move it away, or choose another --out"
+        )
+    return target
+
+
+def _runs(logs: Logs) -> tuple[list[_Run], list[Problem]]:
+    """The runs whose logs are used, by their journals; and the logs that no journal proves."""
+    runs, unproven = list[_Run](), list[Problem]()
+    for part in (logs, *logs.apart):
+        for file in part.files:
+            path = Path(journal_of(str(file)))
+            code, experiment = code_in_name(file.name) or "", experiment_in_name(file.name)
+            try:
+                data = journal.journal_bytes(path)
+                found = journal.contents_of(path, data)
+            except JournalError as error:
+                said = f"no journal proves this log, so it cannot be archived: {error}"
+                unproven.append(BadLogError(said).of(file, code, experiment, ""))
+                continue
+            if found is None:
+                unproven.append(BadLogError("its journal holds no whole record").of(file, code, experiment, ""))
+            else:
+                runs.append(_Run(path=path, data=data, contents=found, kind=part.kind))
+    return runs, unproven
+
+
+def _entries(runs: Iterable[_Run]) -> Iterator[Entry]:
+    for run in runs:
+        plan = run.contents.plan
+        state: State = "finished" if run.contents.finished else "not finished"
+        yield Entry(participant_id=run.code, experiment=plan.experiment, state=state, kind=run.kind)
+
+
+def _write_results(part: Path, runs: Sequence[_Run], members: Mapping[str, Member], *, free_text: bool) -> None:
+    """The redacted journals, the tables that they make, what their columns mean, and a register of who is here."""
+    first = {run.code: redaction.moment_of(run.contents.head.utc) for run in runs}
+    for run in runs:
+        first[run.code] = min(first[run.code], redaction.moment_of(run.contents.head.utc))
+    for run in runs:
+        code, name = run.code, f"sub-{run.code}_task-{run.contents.plan.experiment}{journal.ENDING}"
+        place = f"{RESULTS}/sub-{code}/{name}"
+        placing.write_file(part, place, redaction.redacted(run.path, run.data, first[code], free_text=free_text))
+        table, data, made = rebuild(part / place)
+        placing.write_file(table.parent, table.name, data)
+        design = began_with(made.head)
+        placing.write_file(part, f"{RESULTS}/task-{design.design}_columns.md", design_dictionary(design).encode())
+    facts = redaction.redacted_register(members[code] for code in first if code in members)
+    if facts:
+        placing.write_file(part, f"{RESULTS}/{REGISTER_FILE}", facts)
+
+
+def _write_analysis(part: Path, request: ArchiveRequest, settings: ArchiveSettings, progress: Progress) -> None:
+    for given, path in ((request.rules, RULES), (request.requests, REQUESTS)):
+        if given is not None:
+            placing.write_file(part, path, given.read_bytes())
+    placing.write_file(part, SETTINGS, as_json(settings))
+    analyze(analysis_of(part, settings), progress=progress)
+
+
+def _write_bids(part: Path, request: ArchiveRequest, settings: ArchiveSettings, results: Path) -> None:
+    """The data set; what people added to one that was exported from the study before stays in it."""
+    files = bids_files(part, settings)
+    earlier = next((one for one in (results / BIDS, request.folder / BIDS) if bids_export.is_export(one)), None)
+    for path, data in (files | bids_export.filled_in(earlier, files)).items():
+        placing.write_file(part, f"{BIDS}/{path}", data)
+
+
+def _write_pages(
+    part: Path, settings: ArchiveSettings, entries: Sequence[Entry], designs: Sequence[ArchivedDesign]
+) -> None:
+    page = pages.readme(settings.title, recoil_version(), entries, free_text=settings.free_text)
+    placing.write_file(part, "README.md", page)
+    placing.write_file(part, "METHODS.md", pages.methods(designs))
+    placing.write_file(part, CONTENTS, contents.contents_table(entries))
+
+
+def _designs(runs: Iterable[_Run]) -> list[ArchivedDesign]:
+    """The designs of the runs, each with its gun; one that was changed during the study stands as often as it was."""
+    by_setup: dict[str, list[_Run]] = {}
+    for run in sorted(runs, key=lambda run: (run.contents.plan.experiment, run.code)):
+        by_setup.setdefault(run.contents.head.setup_sha256, []).append(run)
+    found = []
+    for some in by_setup.values():
+        head = some[0].contents.head
+        setup = head.setup_json if isinstance(head.setup_json, dict) else {}
+        gun = checked_table(GunConfig, setup.get("gun", {}), f"{head.path}: line 1")
+        codes = tuple(run.code for run in some)
+        found.append(ArchivedDesign(design=began_with(head), gun=gun, participants=codes))
+    return found
+
+
+def _citation(folders: Iterable[Path]) -> bytes | None:
+    """The file that the authors filled in, if there is one in the study's folder."""
+    path = next((one / CITATION for one in folders if (one / CITATION).is_file()), None)
+    return read_text(path).encode() if path else None
+
+
+def _preregistrations(folders: Iterable[Path]) -> list[Path]:
+    """What a study was frozen as, whose hashes its journals carry."""
+    found = (sorted(one.glob("preregistration-*")) for one in folders)
+    return [path for path in next(filter(None, found), []) if path.suffix in (".json", ".md") and path.is_file()]
+
+
+def _write_package(part: Path, title: str, runs: Iterable[_Run]) -> None:
+    """The data package: every table with a schema."""
+    schemas, resources = dict[bytes, str](), list[Resource]()
+    for path, name, schema in _tables(part, runs):
+        taken = sum(one.startswith((f"schemas/{name}.", f"schemas/{name}-")) for one in schemas.values())
+        place = schemas.setdefault(schema, f"schemas/{name}{f'-{taken + 1}' if taken else ''}.json")
+        placing.write_file(part, place, schema)
+        resources.append(Resource(path=path, data=(part / path).read_bytes(), title=Path(path).name, schema=place))
+    package = datapackage.descriptor(title, recoil_version(), resources)
+    placing.write_file(part, datapackage.DESCRIPTOR, package)
+
+
+def _tables(part: Path, runs: Iterable[_Run]) -> Iterator[tuple[str, str, bytes]]:
+    """Every table by its path in the archive, with a name for its schema, and that."""
+    for run in runs:
+        design = began_with(run.contents.head)
+        columns = design_table.columns(design)
+        keys = [column.name for column in columns if column.name in ("participant_id", "session", "trial")]
+        path = f"{RESULTS}/sub-{run.code}/sub-{run.code}_task-{design.design}_{design.table}.csv"
+        yield path, f"task-{design.design}", datapackage.schema(columns, keys)
+    for file in sorted((part / ANALYSIS).rglob("*.csv")):
+        path = file.relative_to(part).as_posix()
+        yield path, path.removesuffix(".csv"), datapackage.schema_of_results(file.read_bytes())
+    yield CONTENTS, "contents", datapackage.schema(contents.COLUMNS)
+    people = (part / BIDS / "participants.tsv").read_text(encoding="utf-8").split("\n", 1)[0]
+    yield f"{BIDS}/participants.tsv", "participants", datapackage.schema_of_participants(people.split("\t"))

@@ -1,0 +1,104 @@
+"""Who and what of a study is in an archive, and what is left out for which reason: nobody without a word."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from analysis.logs.files import Problem, code_in_name, experiment_in_name
+from analysis.logs.journals import RunFile
+from analysis.logs.kinds import kept_out
+from analysis.logs.reading import Logs
+from experiments.record import tables
+from experiments.record.tables import Column, DataKind
+from experiments.study.study import Member
+
+CONTENTS = "contents.csv"
+Here = Literal["finished", "not finished"]
+State = Here | Literal["excluded", "begun", "practice", "set aside", "kept out", "no journal", "broken", "no run"]
+"""How a run stands; only the first two are in an archive."""
+MEANINGS: Mapping[State, str] = {
+    "finished": "in the archive",
+    "not finished": "in the archive as far as it came: the run was stopped before its end",
+    "excluded": "left out: the participant was excluded; the reason stands in the study's register alone",
+    "begun": "left out: the run broke off and has no table",
+    "practice": "left out: a practice, which is never analysed",
+    "set aside": "left out: an unfinished run that was set aside for a fresh one",
+    "kept out": "left out: data of another kind (real, simulated gun, synthetic) than the archive's",
+    "no journal": "left out: a table that no journal proves",
+    "broken": "left out: table or journal breaks a rule, or was changed since the run",
+    "no run": "the participant joined and has no run",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """A run of a participant, or a participant without one, and how it stands."""
+
+    participant_id: str
+    experiment: str
+    state: State
+    kind: DataKind | None = None
+
+    @property
+    def archived(self) -> bool:
+        """Whether it is in the archive."""
+        return self.state in get_args(Here)
+
+
+COLUMNS: tuple[Column, ...] = (
+    tables.text_column("participant_id", "participant's code; empty where no file says whose it is"),
+    tables.text_column("experiment", "which experiment; empty where there is no run"),
+    tables.flag_column("in_archive", "1 if the run is in the archive, 0 if it is left out"),
+    tables.level_column("state", tuple(MEANINGS), "how the run stands, or why it is left out", required=True),
+    tables.level_column("data", ("real", "simulated gun", "synthetic"), "whose data they are; empty if left out"),
+)
+
+
+def contents_table(entries: Iterable[Entry]) -> bytes:
+    """The table of an archive's runs and of those that are left out."""
+    rows = (
+        tables.Row(
+            participant_id=one.participant_id,
+            experiment=one.experiment,
+            in_archive=int(one.archived),
+            state=one.state,
+            data=one.kind,
+        )
+        for one in sorted(entries, key=lambda one: (one.participant_id, one.experiment, one.state))
+    )
+    return tables.table_bytes(COLUMNS, rows)
+
+
+def left_out(logs: Logs, members: Mapping[str, Member], without_journal: Collection[Problem]) -> Iterator[Entry]:
+    """What of a study is not in its archive. `logs` are all of it, `without_journal` those that no journal proves."""
+    excluded = {code for code, member in members.items() if member.excluded is not None}
+    runs = [run for part in (logs, *logs.apart) for run in part.runs]
+    for run in runs:
+        if run.kind != "run":
+            yield _of_run(run, run.kind, excluded)
+    for begun in logs.begun:
+        yield _of_run(begun.file, "begun", excluded)
+    for problem in (*logs.problems, *without_journal):
+        state: State = "no journal" if problem in without_journal else _why(problem)
+        code = problem.participant or code_in_name(str(problem.file)) or ""
+        experiment = problem.experiment or experiment_in_name(str(problem.file))
+        yield Entry(participant_id=code, experiment=experiment, state="excluded" if code in excluded else state)
+    files = {code_in_name(str(file)) for part in (logs, *logs.apart) for file in part.files}
+    seen = {run.participant for run in runs} | files | {problem.participant for problem in logs.problems}
+    for code in members:
+        if code not in seen:
+            yield Entry(participant_id=code, experiment="", state="excluded" if code in excluded else "no run")
+
+
+def _of_run(run: RunFile, state: State, excluded: Collection[str]) -> Entry:
+    why = "excluded" if run.participant in excluded else state
+    return Entry(participant_id=run.participant, experiment=run.experiment, state=why)
+
+
+def _why(problem: Problem) -> State:
+    return "kept out" if problem.message in _KEPT_OUT else "broken"
+
+
+_KEPT_OUT = frozenset(kept_out(kind, first) for kind in get_args(DataKind) for first in get_args(DataKind))

@@ -1,0 +1,49 @@
+"""What the redacted journals of an archive make: written when it is exported, made again when it is verified."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from analysis.archive import bids_export
+from analysis.logs.reading import read_logs
+from analysis.summary.analyze import Request
+from experiments.config.door import Model, Text, checked_table, read_text
+
+SETTINGS, RESULTS, ANALYSIS, BIDS = "archive.json", "results", "analysis", "bids"
+RULES, REQUESTS = f"{ANALYSIS}/rules.toml", f"{ANALYSIS}/requests.toml"
+
+
+class ArchiveSettings(Model):
+    """How an archive was made: what has to be known to make its tables and statistics again."""
+
+    format: Literal[1] = 1
+    title: Text
+    free_text: bool
+    include_synthetic: bool
+
+
+def read_settings(folder: Path) -> ArchiveSettings:
+    """How an archive was made. `ConfigError` if its file does not say so."""
+    path = folder / SETTINGS
+    return checked_table(ArchiveSettings, bids_export.read_json(path), path, read_text(path))
+
+
+def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
+    """The analysis that an archive holds, of the journals and tables in it."""
+    rules, requests = folder / RULES, folder / REQUESTS
+    return Request(
+        paths=[folder / RESULTS],
+        out=folder / ANALYSIS,
+        title=settings.title,
+        include_synthetic=settings.include_synthetic,
+        rules=rules if rules.is_file() else None,
+        requests=requests if requests.is_file() else None,
+    )
+
+
+def bids_files(folder: Path, settings: ArchiveSettings) -> dict[str, bytes]:
+    """The files of the BIDS data set that an archive's journals and tables make."""
+    logs = read_logs([folder / RESULTS], include_synthetic=settings.include_synthetic)
+    members = bids_export.members_of(folder / RESULTS)
+    return bids_export.data_set_of(logs, members, settings.title, free_text=settings.free_text)[1]

@@ -1,0 +1,143 @@
+"""What an archive says of itself: its page, the Methods section of its designs, and how it is to be cited. Pure."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from analysis.archive.contents import CONTENTS, MEANINGS, Entry
+from analysis.archive.manifest import MANIFEST
+from experiments.config.setup import GunConfig
+from experiments.design.config import DesignConfig
+from experiments.design.methods_section import methods_section
+from experiments.design.planned import runs_of_groups
+
+CITATION = "CITATION.cff"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArchivedDesign:
+    """A design with the gun that it ran on, and who did it with whom of them finished."""
+
+    design: DesignConfig
+    gun: GunConfig
+    participants: tuple[str, ...]
+
+
+_README = """# {title}
+
+The data of a study with a haptic gun, written by Recoil {version} (`recoil export archive`). All tables and statistics
+in it are made from the journals in it; `recoil verify` of this folder checks every file and makes them again. Without
+Recoil, `sha256sum --check {manifest}` checks the files.
+
+| file | holds |
+| --- | --- |
+| `results/` | each run's journal, redacted, and the table that it makes; what the columns mean |
+| `analysis/` | statistics, tables of results, figures and report |
+| `bids/` | the same runs as a BIDS data set |
+| `datapackage.json`, `schemas/` | every table as a Frictionless data package, with types, ranges and meanings |
+| `METHODS.md` | the design in the words of a Methods section |
+| `preregistration/` | what the study was frozen as before its first run, if it was; journals name its hash |
+| `{contents}` | every run of the study, those that are left out too, with the reason |
+| `CITATION.cff` | how to cite the data |
+| `archive.json` | how the archive was made, for `recoil verify` |
+| `{manifest}` | the SHA-256 of every other file |
+
+## What is in it
+
+{counts}
+{synthetic}
+## What is redacted
+
+{redacted}
+The first line of each journal holds, as `redacted_from`, the SHA-256 of the last line of the original. That line ends
+the original's own chain of hashes: who keeps the originals can show that nothing else was changed.
+"""
+_HIDDEN = """Participants stand under their codes. In the journals and all that is made from them
+
+- {words}
+- dates and times are moved: each participant's first run begins on 2000-01-01 at 00:00 UTC, and what lies between two
+  moments of a participant is as it was; the computer's and the gun's own clocks begin at 0 with each run;
+- causes of faults, which may name ports and folders, are `[redacted]`, and files of configs stand without their
+  folders;
+- ages above 89 are given as 89; the study's register with its reasons for exclusions is not here.
+
+Designs and their texts, flags that the experimenter set on trials, seeds, versions and the gun's serial number are as
+they were.
+"""
+_NO_WORDS = """\
+what people wrote (descriptions, notes, reasons) is `[redacted]`, as it might say who someone is; what was
+  empty is empty;"""
+_WORDS = "what people wrote (descriptions, notes, reasons) is as it was: the archive was made with `--free-text`;"
+_SYNTHETIC = """
+Some participants are synthetic: a simulation answered, not a person (column `data` of `contents.csv`).
+"""
+
+
+def readme(title: str, version: str, entries: Sequence[Entry], *, free_text: bool) -> bytes:
+    """The page of an archive: what lies where, who is in it and who is not, what is redacted and why."""
+    simulated = any(one.kind == "synthetic" for one in entries)
+    return _README.format(
+        title=title,
+        version=version,
+        manifest=MANIFEST,
+        contents=CONTENTS,
+        counts="\n".join(_counts(entries)),
+        synthetic=_SYNTHETIC if simulated else "",
+        redacted=_HIDDEN.format(words=_WORDS if free_text else _NO_WORDS),
+    ).encode()
+
+
+def _counts(entries: Sequence[Entry]) -> Iterator[str]:
+    """How many runs are in which state, with whose they are."""
+    people = {one.participant_id for one in entries if one.archived}
+    yield f"{len(people)} participant{'' if len(people) == 1 else 's'}.\n"
+    yield "| experiment | state | runs | means |"
+    yield "| --- | --- | --- | --- |"
+    counts = Counter((one.experiment, one.state) for one in entries)
+    order = {state: place for place, state in enumerate(MEANINGS)}
+    for (experiment, state), count in sorted(counts.items(), key=lambda pair: (pair[0][0], order[pair[0][1]])):
+        yield f"| {experiment or '–'} | {state} | {count} | {MEANINGS[state]} |"
+
+
+def methods(designs: Iterable[ArchivedDesign]) -> bytes:
+    """The Methods section of each design, with how many did it."""
+    return "\n".join(line for one in designs for line in _method(one)).encode()
+
+
+def _method(one: ArchivedDesign) -> Iterator[str]:
+    count = len(one.participants)
+    yield f"# {one.design.title}\n"
+    yield f"Experiment `{one.design.design}`, {count} participant{'' if count == 1 else 's'}; gun: {one.gun.title}.\n"
+    for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun)):
+        yield f"{paragraph}\n"
+
+
+def citation(title: str, version: str) -> bytes:
+    """A `CITATION.cff` for the author to fill in. Reference: Citation File Format 1.2.0, https://citation-file-format.github.io"""
+    values: Mapping[str, str] = {"title": json.dumps(title, ensure_ascii=False), "version": json.dumps(version)}
+    return _CITATION.format(**values).encode()
+
+
+_CITATION = """# For the authors: put this file, filled in, into the study's folder, and export the archive anew.
+cff-version: 1.2.0
+message: "If you use these data, please cite them as below."
+type: dataset
+title: {title}
+authors:
+  - family-names: "FAMILY NAME"
+    given-names: "GIVEN NAMES"
+#   orcid: https://orcid.org/0000-0000-0000-0000
+#   affiliation: "INSTITUTION"
+# license: CC-BY-4.0
+# date-released: 2000-01-01
+# doi: 10.5281/zenodo.0000000
+references:
+  - type: software
+    title: "Recoil"
+    version: {version}
+    authors:
+      - name: "Recoil maintainers"
+"""

@@ -1,0 +1,204 @@
+"""`recoil verify`: is an archive whole, and do its journals make its tables and statistics?
+
+First every hash; only of a whole archive tables and statistics are made again from the redacted journals, byte for
+byte. Made with other versions of libraries, numbers may differ by 1e-12, and each that does is named.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.archive import making, manifest
+from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
+from analysis.logs.reading import Track
+from analysis.report.serial import as_json
+from analysis.summary.analyze import result_files
+from analysis.summary.sections.sections import STATISTICS
+from device.words import RecoilError
+from experiments.rebuild import rebuild
+from experiments.record import journal
+from experiments.study.folders import PlaceError
+
+CLOSE = 1e-12
+"""How far numbers may be from each other, in parts of the larger one or by themselves."""
+_NAMED = 20
+"""So many numbers of a file are named."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verified:
+    """What was checked of an archive, what is wrong with it, and what there is to say otherwise.
+
+    `manifest_sha256` vouches for all of it: whoever published it knows which archive this is. `rebuilt` are the tables
+    and statistics that were made again and found to be the same; none if a hash is wrong already.
+    """
+
+    archive: str
+    manifest_sha256: str
+    files: int
+    rebuilt: int
+    faults: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.faults
+
+    def as_text(self) -> str:
+        """The verdict in a line."""
+        if self.whole:
+            made = f"{self.rebuilt} tables and statistics made again from its journals are the same"
+            vouches = f"sha256 of its manifest: {self.manifest_sha256}"
+            return f"{self.archive}: whole ({self.files} files), and {made}\n{vouches}"
+        return f"{self.archive}: {len(self.faults)} of its parts are not as they were archived"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Made:
+    """A file of an archive as it was made again; `close` where numbers of other versions may differ a little."""
+
+    path: str
+    data: bytes
+    close: bool = False
+
+
+def verify(folder: Path, track: Track = iter) -> Verified:
+    """Check an archive. `PlaceError` if the folder is none."""
+    if not folder.is_dir():
+        raise PlaceError(f"{folder}: no such folder; name an archive that `recoil export archive` wrote")
+    hashes = manifest.read_manifest(folder)
+    faults = [*hashes.faults, *manifest.faults(folder, hashes)]
+    remarks, rebuilt = list[str](), 0
+    if not faults:
+        try:
+            made = [*_made_again(folder, hashes.listed, track)]
+            faults, remarks = _compared(folder, hashes.listed, made)
+            rebuilt = len(made)
+        except RecoilError as error:
+            faults = [f"cannot be made again: {line}" for line in str(error).splitlines()]
+    return Verified(
+        archive=str(folder),
+        manifest_sha256=hashes.sha256,
+        files=len(hashes.listed),
+        rebuilt=rebuilt,
+        faults=tuple(faults),
+        remarks=tuple(remarks),
+    )
+
+
+def _made_again(folder: Path, listed: Mapping[str, str], track: Track) -> Iterator[_Made]:
+    """Tables of runs, statistics with tables of results, and the tables of the BIDS data set."""
+    settings = making.read_settings(folder)
+    for path in sorted(listed):
+        if path.startswith(f"{RESULTS}/") and path.endswith(journal.ENDING):
+            table, data, _ = rebuild(folder / path)
+            yield _Made(path=table.relative_to(folder).as_posix(), data=data)
+    yield from _results(folder, settings, track)
+    for path, data in making.bids_files(folder, settings).items():
+        if path.endswith(".tsv"):
+            yield _Made(path=f"{BIDS}/{path}", data=data)
+
+
+def _results(folder: Path, settings: ArchiveSettings, track: Track) -> Iterator[_Made]:
+    files = result_files(making.analysis_of(folder, settings), track)
+    ours = json.loads(files[STATISTICS])["versions"]
+    theirs = _versions(folder)
+    other = theirs != ours
+    as_theirs = as_json(json.loads(files[STATISTICS]) | {"versions": theirs})
+    for path, data in (files | {STATISTICS: as_theirs}).items():
+        yield _Made(path=f"{ANALYSIS}/{path}", data=data, close=other)
+
+
+def _versions(folder: Path) -> object:
+    """The versions that an archive's statistics were made with."""
+    values = _json(folder / ANALYSIS / STATISTICS)
+    return values.get("versions") if isinstance(values, dict) else None
+
+
+def _json(path: Path) -> object:
+    try:
+        return json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        raise PlaceError(f"{path}: is no JSON file that can be read ({error})") from error
+
+
+def _compared(folder: Path, listed: Mapping[str, str], made: Sequence[_Made]) -> tuple[list[str], list[str]]:
+    """What differs between an archive and what its journals make: what must not, and what may."""
+    faults, remarks = list[str](), list[str]()
+    for one in made:
+        if one.path not in listed:
+            faults.append(f"{one.path}: missing: its journals make it")
+        elif (folder / one.path).read_bytes() != one.data:
+            found = _differences(folder / one.path, one)
+            (remarks if one.close and all(close for _, close in found) else faults).extend(_named(one.path, found))
+    tables = {path for path in listed if _is_made(path)} - {one.path for one in made}
+    faults += [f"{path}: no journal of the archive makes it" for path in sorted(tables)]
+    return faults, remarks
+
+
+def _is_made(path: str) -> bool:
+    """Whether a path is that of a table which journals make."""
+    room, ending = path.partition("/")[0], path.rpartition(".")[2]
+    return (room, ending) in ((RESULTS, "csv"), (ANALYSIS, "csv"), (BIDS, "tsv"))
+
+
+def _named(path: str, found: Sequence[tuple[str, bool]]) -> Iterator[str]:
+    for said, close in found[:_NAMED]:
+        yield f"{path}: {said}{f' (less than {CLOSE:g} apart: other versions)' if close else ''}"
+    if len(found) > _NAMED:
+        yield f"{path}: and {len(found) - _NAMED} more differences"
+
+
+def _differences(path: Path, made: _Made) -> list[tuple[str, bool]]:
+    """Where a file differs from what was made again, each with whether numbers are close."""
+    try:
+        theirs, ours = (dict(_leaves(path.suffix, data)) for data in (path.read_bytes(), made.data))
+    except (ValueError, RecursionError, csv.Error) as error:
+        return [(f"cannot be read ({error})", False)]
+    places = dict.fromkeys([*theirs, *ours])
+    found = [
+        (
+            f"{place} is {theirs.get(place, 'missing')} in the archive, its journals make {ours.get(place, 'none')}",
+            _is_close(theirs.get(place), ours.get(place)),
+        )
+        for place in places
+        if theirs.get(place) != ours.get(place) or place not in theirs or place not in ours
+    ]
+    return found or [("differs in its layout alone: blanks, ends of lines or the spelling of numbers", False)]
+
+
+def _is_close(one: object, other: object) -> bool:
+    try:
+        return math.isclose(float(str(one)), float(str(other)), rel_tol=CLOSE, abs_tol=CLOSE)
+    except ValueError:
+        return False
+
+
+def _leaves(suffix: str, data: bytes) -> Iterator[tuple[str, object]]:
+    """Every value of a JSON file or a table, by its place."""
+    if suffix == ".json":
+        yield from _values(json.loads(data))
+        return
+    rows = csv.reader(data.decode().splitlines(), delimiter="\t" if suffix == ".tsv" else ",")
+    header = next(rows, [])
+    yield from ((f"column {place}", name) for place, name in enumerate(header, start=1))
+    for line, row in enumerate(rows, start=2):
+        names = [*header, *(f"cell {place}" for place in range(len(header) + 1, len(row) + 1))]
+        yield from ((f"line {line}, {name}", cell) for name, cell in zip(names, row, strict=False))
+
+
+def _values(value: object, place: str = "") -> Iterator[tuple[str, object]]:
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield from _values(one, f"{place}.{key}".lstrip("."))
+    elif isinstance(value, list):
+        for number, one in enumerate(value):
+            yield from _values(one, f"{place}[{number}]")
+    else:
+        yield place, value
