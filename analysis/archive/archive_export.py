@@ -21,13 +21,15 @@ from analysis.archive.making import (
     bids_files,
 )
 from analysis.archive.pages import CITATION, ArchivedDesign
+from analysis.logs.exclusions import Rules
 from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, unseen
 from analysis.summary.analyze import analyze
-from experiments.config.door import checked_table, read_text
+from analysis.summary.requests import Requests
+from experiments.config.door import checked_table, load, read_text
 from experiments.config.setup import GunConfig
 from experiments.rebuild import began_with, rebuild
 from experiments.record import design_table, journal
@@ -44,11 +46,12 @@ from experiments.study.study import Member
 class ArchiveRequest:
     """The folder that holds a study's logs, where the archive goes, and what is to be in it.
 
-    `rules` and `requests` are the files that the analysis of the paper was made with.
+    Without `out` that is beside the study. `rules` and `requests` are the files that the analysis of the paper was made
+    with.
     """
 
     folder: Path
-    out: Path
+    out: Path | None = None
     free_text: bool = False
     include_synthetic: bool = False
     rules: Path | None = None
@@ -89,6 +92,9 @@ def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = u
     `RegisterError` if the register cannot be trusted; `ConfigError` for a file that was given.
     """
     target = _free_target(request)
+    for model, file in ((Rules, request.rules), (Requests, request.requests)):
+        if file is not None:
+            load(model, file)
     logs = read_logs([request.folder], track, include_synthetic=request.include_synthetic)
     refuse_nothing([request.folder], logs)
     results = bids_export.results_of(request.folder, logs)
@@ -112,7 +118,7 @@ def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = u
         files = manifest.manifest_bytes(part)
         placing.write_file(part, manifest.MANIFEST, files)
     return Archived(
-        out=str(request.out),
+        out=str(request.out or target),
         manifest_sha256=manifest.read_manifest(target).sha256,
         files=files.count(b"\n"),
         participants=len({run.code for run in runs}),
@@ -124,17 +130,16 @@ def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = u
 
 def _free_target(request: ArchiveRequest) -> Path:
     """Where the archive goes. `PlaceError`: something is there, or it would be read as a part of the study."""
-    folder, target = request.folder, request.out.resolve()
-    if not folder.is_dir():
-        raise PlaceError(f"{folder}: no such folder; name the folder that holds the logs")
-    if target.is_relative_to(folder.resolve()):
-        raise PlaceError(
-            f"{request.out}: lies in {folder}, whose logs would then be read twice; choose an --out beside it"
-        )
+    if not request.folder.is_dir():
+        raise PlaceError(f"{request.folder}: no such folder; name the folder that holds the logs")
+    here = request.folder.resolve()
+    study = here.parent if (here.parent / "study.toml").is_file() else here
+    shown = request.out or study.with_name(f"{study.name}-archive")
+    target = shown.resolve()
+    if target.is_relative_to(study):
+        raise PlaceError(f"{shown}: lies in {study}, whose logs would then be read twice; choose an --out beside it")
     if not placing.is_free(target):
-        raise PlaceError(
-            f"{request.out}: is there already, and no archive is overwritten; move it away, or choose another --out"
-        )
+        raise PlaceError(f"{shown}: is there already, and no archive is overwritten; move it away, or choose an --out")
     return target
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.archive import making, manifest
+from analysis.archive import making, manifest, placing
 from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
 from analysis.logs.reading import Track
 from analysis.report.serial import as_json
@@ -23,6 +25,7 @@ from device.words import RecoilError
 from experiments.rebuild import rebuild
 from experiments.record import journal
 from experiments.study.folders import PlaceError
+from experiments.study.register import REGISTER_FILE
 
 CLOSE = 1e-12
 """How far numbers may be from each other, in parts of the larger one or by themselves."""
@@ -76,12 +79,14 @@ def verify(folder: Path, track: Track = iter) -> Verified:
     faults = [*hashes.faults, *manifest.faults(folder, hashes)]
     remarks, rebuilt = list[str](), 0
     if not faults:
-        try:
-            made = [*_made_again(folder, hashes.listed, track)]
-            faults, remarks = _compared(folder, hashes.listed, made)
-            rebuilt = len(made)
-        except RecoilError as error:
-            faults = [f"cannot be made again: {line}" for line in str(error).splitlines()]
+        with tempfile.TemporaryDirectory(prefix="recoil-verify-") as place:
+            try:
+                made = [*_made_again(folder, Path(place), hashes.listed, track)]
+                faults, remarks = _compared(folder, hashes.listed, made)
+                rebuilt = len(made)
+            except RecoilError as error:
+                said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")
+                faults = [f"cannot be made again: {line}" for line in said.splitlines()]
     return Verified(
         archive=str(folder),
         manifest_sha256=hashes.sha256,
@@ -92,23 +97,35 @@ def verify(folder: Path, track: Track = iter) -> Verified:
     )
 
 
-def _made_again(folder: Path, listed: Mapping[str, str], track: Track) -> Iterator[_Made]:
-    """Tables of runs, statistics with tables of results, and the tables of the BIDS data set."""
+def _made_again(folder: Path, place: Path, listed: Mapping[str, str], track: Track) -> Iterator[_Made]:
+    """Tables of runs, statistics with tables of results, and the tables of the BIDS data set.
+
+    They are made at another place, without the archive's tables: what is wrong with one of these makes no other wrong.
+    """
     settings = making.read_settings(folder)
     for path in sorted(listed):
-        if path.startswith(f"{RESULTS}/") and path.endswith(journal.ENDING):
-            table, data, _ = rebuild(folder / path)
-            yield _Made(path=table.relative_to(folder).as_posix(), data=data)
-    yield from _results(folder, settings, track)
-    for path, data in making.bids_files(folder, settings).items():
+        if _is_source(path):
+            placing.write_file(place, path, (folder / path).read_bytes())
+            if path.endswith(journal.ENDING):
+                table, data, _ = rebuild(place / path)
+                placing.write_file(table.parent, table.name, data)
+                yield _Made(path=table.relative_to(place).as_posix(), data=data)
+    yield from _results(place, settings, _versions(folder), track)
+    for path, data in making.bids_files(place, settings).items():
         if path.endswith(".tsv"):
             yield _Made(path=f"{BIDS}/{path}", data=data)
 
 
-def _results(folder: Path, settings: ArchiveSettings, track: Track) -> Iterator[_Made]:
-    files = result_files(making.analysis_of(folder, settings), track)
+def _is_source(path: str) -> bool:
+    """Whether a file is one that all others are made from."""
+    is_result = path.startswith(f"{RESULTS}/") and path.endswith((journal.ENDING, REGISTER_FILE))
+    return is_result or path in (making.RULES, making.REQUESTS)
+
+
+def _results(place: Path, settings: ArchiveSettings, theirs: object, track: Track) -> Iterator[_Made]:
+    """The statistics with `theirs` as versions, and the tables of results."""
+    files = result_files(making.analysis_of(place, settings), track)
     ours = json.loads(files[STATISTICS])["versions"]
-    theirs = _versions(folder)
     other = theirs != ours
     as_theirs = as_json(json.loads(files[STATISTICS]) | {"versions": theirs})
     for path, data in (files | {STATISTICS: as_theirs}).items():

@@ -72,10 +72,9 @@ def archive(
     """One folder to publish: redacted journals, and tables, statistics, figures, report and BIDS made from them."""
     from analysis.archive import archive_export as feature
 
-    here = study.resolve()
     asked = feature.ArchiveRequest(
         folder=study,
-        out=out or here.with_name(f"{here.name}-archive"),
+        out=out,
         free_text=free_text,
         include_synthetic=include_synthetic,
         rules=rules,

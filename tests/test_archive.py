@@ -1,0 +1,406 @@
+"""`recoil export archive` and `recoil verify`: what is published, what is not, and that no change goes unnoticed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import random
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+
+from analysis.archive import archive_export, manifest, placing
+from analysis.archive.archive_export import Archived, ArchiveRequest
+from analysis.archive.redaction import FIRST_MOMENT, REDACTED, moment_of, redacted
+from analysis.archive.verify import verify
+from experiments.record.journal import contents_of, ending_of, read_journal
+from experiments.session import remarks, steps
+from experiments.study.folders import PlaceError
+from experiments.study.register import RegisterError
+from tests.archived_studies import NAME, SECRET_PLACES, WORDS, sealed, small_study
+from tests.conftest import Recoil, refused
+from tests.journals import forged, raw
+
+pytestmark = pytest.mark.slow
+
+TRIALS = "results/sub-P01/sub-P01_task-direction_trials.csv"
+JOURNAL = "results/sub-P01/sub-P01_task-direction_journal.jsonl"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Archived]:
+    """The study, its archive, and what was said of it."""
+    folder = tmp_path_factory.mktemp("archived")
+    study = small_study(folder / "study")
+    done = archive_export.archive(ArchiveRequest(folder=study, out=folder / "archive"))
+    return study, folder / "archive", done
+
+
+@pytest.fixture
+def copy(made: tuple[Path, Path, Archived], tmp_path: Path) -> Path:
+    """The archive, to be changed."""
+    shutil.copytree(made[1], tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+# what is in it
+
+
+def test_an_archive_is_whole_and_its_journals_make_its_tables_and_statistics(
+    made: tuple[Path, Path, Archived],
+) -> None:
+    _, archive, done = made
+    found = verify(archive)
+    assert (found.faults, found.remarks) == ((), ())
+    assert found.manifest_sha256 == done.manifest_sha256
+    assert found.files == done.files == len(tree(archive)) - 1
+    assert found.rebuilt == len([path for path in tree(archive) if re.search(r"\.csv$|beh\.tsv$", path)]) - 1 + 2
+
+
+def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path, Path, Archived]) -> None:
+    _, archive, done = made
+    found = {(row["participant_id"], row["experiment"], row["state"]) for row in rows(archive / "contents.csv")}
+    assert found == {
+        ("P01", "direction", "not finished"),
+        ("P01", "direction", "practice"),
+        ("P01", "preference", "finished"),
+        ("P02", "direction", "finished"),
+        ("P02", "preference", "finished"),
+        ("P02", "preference", "set aside"),
+        ("P03", "direction", "not finished"),
+        ("P03", "preference", "finished"),
+        ("P04", "direction", "begun"),
+        ("P04", "preference", "broken"),
+        ("P05", "direction", "excluded"),
+        ("P05", "preference", "excluded"),
+        ("P06", "", "no run"),
+    }
+    page = (archive / "README.md").read_text()
+    assert "3 participants." in page
+    assert (
+        "| preference | broken | 1 | left out: table or journal breaks a rule, or was changed since the run |" in page
+    )
+    assert "Some participants are synthetic" in page
+    assert {path.parts[0] for path in (Path(one) for one in tree(archive / "results"))} == {
+        *("sub-P01", "sub-P02", "sub-P03", "participants.jsonl"),
+        *("task-direction_columns.md", "task-preference_columns.md"),
+    }
+    said = " ".join((*done.left_out, *done.remarks))
+    for words in ("P05 is excluded", "P04 has begun direction", "sub-P04_task-preference_ratings.csv"):
+        assert words in said
+
+
+def test_the_statistics_are_those_of_the_study(made: tuple[Path, Path, Archived], tmp_path: Path) -> None:
+    from analysis.summary.analyze import Request, result_files
+
+    study, archive, _ = made
+    ours = json.loads((archive / "analysis" / "statistics.json").read_bytes())
+    files = result_files(Request(paths=[study / "results"], out=tmp_path))
+    theirs = json.loads(files["statistics.json"])
+    for experiment in ("direction", "preference"):
+        assert ours[experiment] == theirs[experiment]
+    assert {name: data for name, data in files.items() if name.endswith(".csv")} == {
+        path.name: path.read_bytes() for path in (archive / "analysis").glob("*.csv")
+    }
+
+
+# what is redacted
+
+
+def test_nothing_that_is_published_names_a_person_a_place_or_a_day(made: tuple[Path, Path, Archived]) -> None:
+    study, archive, _ = made
+    today = {str(datetime.now(UTC).date()), read_journal(study / JOURNAL).head.utc[:10]}
+    for path, data in tree(archive).items():
+        for words in (NAME, "Ohm", "ohm/", *SECRET_PLACES, *today, str(study)):
+            assert words.encode() not in data, (path, words)
+
+
+def test_what_a_participant_said_is_hidden_and_what_was_not_said_is_empty(made: tuple[Path, Path, Archived]) -> None:
+    study, archive, _ = made
+    for code in ("P01", "P02", "P03"):
+        table = f"results/sub-{code}/sub-{code}_task-preference_ratings.csv"
+        before, after = (rows(folder / table) for folder in (study, archive))
+        assert [row["comment"] for row in after] == [REDACTED if row["comment"] == WORDS else "" for row in before]
+        assert [row["rating"] for row in after] == [row["rating"] for row in before]
+    spoken = [path for path, data in tree(study / "results").items() if f",{WORDS},".encode() in data]
+    assert spoken
+
+
+def test_a_redacted_journal_follows_from_its_own_lines_and_names_the_original(
+    made: tuple[Path, Path, Archived],
+) -> None:
+    import hashlib
+
+    study, archive, _ = made
+    for path in sorted(archive.rglob("*_journal.jsonl")):
+        original = study / path.relative_to(archive)
+        head, lines = raw(path)[0], original.read_bytes().splitlines()
+        assert head["redacted_from"]["last_line_sha256"] == hashlib.sha256(lines[-1]).hexdigest()
+        assert len(raw(path)) == len(lines)
+        if read_journal(path).finished:
+            of_table, itself = ending_of(path.read_bytes())
+            assert of_table
+            assert itself
+            assert head["plan_sha256"] == raw(original)[0]["plan_sha256"]
+
+
+def test_times_between_two_moments_of_a_participant_stay(made: tuple[Path, Path, Archived]) -> None:
+    study, archive, _ = made
+    names = [f"sub-P02_task-{experiment}_journal.jsonl" for experiment in ("direction", "preference")]
+    moved = set()
+    for name in names:
+        before, after = (raw(folder / "results" / "sub-P02" / name) for folder in (study, archive))
+        moved |= {moment_of(b["utc"]) - moment_of(a["utc"]) for b, a in zip(before, after, strict=True)}
+        assert after[0]["monotonic_s"] == 0.0
+    assert len(moved) == 1
+    firsts = [raw(archive / "results" / "sub-P02" / name)[0]["utc"] for name in names]
+    assert min(map(moment_of, firsts)) == FIRST_MOMENT
+
+
+def test_free_text_stays_where_it_is_asked_for_but_causes_of_faults_never(
+    made: tuple[Path, Path, Archived],
+) -> None:
+    study, *_ = made
+    path = study / JOURNAL
+    told = redacted(path, path.read_bytes(), moment_of(raw(path)[0]["utc"]), free_text=True).decode()
+    assert f"{NAME} came in" in told
+    assert SECRET_PLACES[0] not in told
+
+
+SAFE = {"gun", "motion", "method", "question", "event", "state", "because", "flag", "kind"}
+"""Fields of outcomes and remarks whose text is of the design or the program."""
+
+
+@pytest.mark.parametrize("word", [*get_args(steps.Outcome), *get_args(remarks.Remark)], ids=lambda word: word.__name__)
+def test_every_text_of_an_outcome_or_remark_is_hidden_but_those_that_are_named_here(
+    made: tuple[Path, Path, Archived], word: type[Any]
+) -> None:
+    head = raw(made[0] / JOURNAL)[0]
+    texts = [one.name for one in fields(word) if one.type == "str" and not one.name.endswith("utc")]
+    body = dict.fromkeys(texts, NAME) | {"kind": "x", "not_known_yet": NAME, "deep": [{"er": NAME}]}
+    kind = "outcome" if word in get_args(steps.Outcome) else "remark"
+    times = {"utc": head["utc"], "monotonic_s": 0.0}
+    data = forged([head, {"kind": kind, "body": body, "host": NAME, **times}])
+    path = made[0] / JOURNAL
+    found = redacted(path, data, moment_of(head["utc"]))
+    _, record = [json.loads(line) for line in found.splitlines()]
+    assert record["host"] == record["body"]["not_known_yet"] == record["body"]["deep"][0]["er"] == REDACTED
+    assert {name for name in texts if record["body"][name] == NAME} <= SAFE
+    assert contents_of(path, found) is not None
+
+
+def test_a_register_says_no_age_above_89_and_nobody_who_is_not_here(made: tuple[Path, Path, Archived]) -> None:
+    found = raw(made[1] / "results" / "participants.jsonl")
+    assert [(one["participant_id"], one["facts"]["age_years"]) for one in found] == [("P01", 89), ("P02", 25)]
+    assert {one["utc"] for one in found} == {"2000-01-01T00:00:00.000000Z"}
+
+
+# what verify finds
+
+
+def test_a_changed_byte_anywhere_is_found_and_its_file_named(copy: Path) -> None:
+    draw = random.Random(1)
+    files = sorted(tree(copy))
+    for path in [manifest.MANIFEST, *draw.sample(files, 24)]:
+        before = (copy / path).read_bytes()
+        place = draw.randrange(len(before))
+        other = draw.choice([byte for byte in range(256) if byte != before[place]])
+        (copy / path).write_bytes(before[:place] + bytes([other]) + before[place + 1 :])
+        found = verify(copy)
+        assert not found.whole
+        assert path == manifest.MANIFEST or any(fault.startswith(f"{path}: changed") for fault in found.faults)
+        (copy / path).write_bytes(before)
+    assert manifest.read_manifest(copy).faults == ()
+
+
+def _link(copy: Path) -> None:
+    (copy / TRIALS).unlink()
+    (copy / TRIALS).symlink_to(copy / "README.md")
+
+
+def _link_of_a_folder(copy: Path) -> None:
+    (copy / "bids").rename(copy.parent / "elsewhere")
+    (copy / "bids").symlink_to(copy.parent / "elsewhere")
+
+
+FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "missing file": (lambda copy: (copy / TRIALS).unlink(), f"{TRIALS}: missing"),
+    "missing folder": (lambda copy: shutil.rmtree(copy / "bids"), "bids/README: missing"),
+    "foreign file": (lambda copy: (copy / "results" / "notes.txt").write_text(""), "results/notes.txt: a foreign file"),
+    "foreign folder": (lambda copy: (copy / "results" / "more").mkdir(), "results/more: a foreign folder"),
+    "foreign name that is no text": (lambda copy: Path(os.fsdecode(os.fsencode(copy) + b"/\xff")).touch(), "a foreign"),
+    "link": (_link, f"{TRIALS}: a link"),
+    "link of a folder": (_link_of_a_folder, "bids: a link"),
+    "special file": (lambda copy: os.mkfifo(copy / "pipe"), "pipe: a special file"),
+    "folder for a file": (
+        lambda copy: [(copy / TRIALS).unlink(), (copy / TRIALS).mkdir()],
+        f"{TRIALS}: a foreign folder",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_is_not_as_it_was_archived_is_named(copy: Path, fault: str) -> None:
+    change, said = FAULTS[fault]
+    change(copy)
+    found = verify(copy)
+    assert any(one.startswith(said) for one in found.faults) or said in " ".join(found.faults)
+    assert found.rebuilt == 0
+
+
+def _edited(copy: Path, path: str, old: str, new: str) -> None:
+    text = (copy / path).read_text()
+    assert old in text
+    (copy / path).write_text(text.replace(old, new, 1))
+    sealed(copy)
+
+
+def test_a_forger_who_writes_the_manifest_anew_is_found_by_the_journals(copy: Path) -> None:
+    (table,) = [path for path in tree(copy) if path.endswith("sub-P02_task-direction_trials.csv")]
+    text = (copy / table).read_text()
+    answer = re.search(r",(\d\.\d+),synthetic", text)
+    assert answer
+    _edited(copy, table, answer[0], ",0.123,synthetic")
+    _edited(copy, "analysis/preference_long.csv", "P03", "P99")
+    statistics = json.loads((copy / "analysis/statistics.json").read_bytes())
+    mean = statistics["preference"]["means"]["vibration"]
+    _edited(copy, "analysis/statistics.json", f"{mean!r}", f"{mean + 1}")
+    found = verify(copy)
+    said = "\n".join(found.faults)
+    assert f"{table}: line " in said
+    assert "analysis/preference_long.csv: line " in said
+    assert f" is {mean + 1} in the archive, its journals make {mean!r}" in said
+
+
+def test_a_journal_that_was_changed_is_named_with_its_line(copy: Path) -> None:
+    _edited(copy, JOURNAL, '"kind":"outcome"', '"kind":"remark"')
+    (fault,) = verify(copy).faults
+    assert f"{JOURNAL}: line " in fault
+
+
+def test_a_table_that_no_journal_makes_is_named(copy: Path) -> None:
+    shutil.copy(copy / "analysis" / "preference_long.csv", copy / "analysis" / "other.csv")
+    sealed(copy)
+    assert verify(copy).faults == ("analysis/other.csv: no journal of the archive makes it",)
+
+
+@pytest.mark.parametrize(("by", "whole"), [(1e-13, True), (1e-6, False)])
+def test_other_versions_may_differ_by_a_millionth_of_a_millionth(copy: Path, by: float, whole: bool) -> None:
+    place = copy / "analysis" / "statistics.json"
+    statistics = json.loads(place.read_bytes())
+    mean = statistics["preference"]["means"]["asymmetric-2"]
+    _edited(copy, "analysis/statistics.json", f"{mean!r}", f"{mean * (1 + by)!r}")
+    assert not verify(copy).whole  # of the same versions every byte counts
+    _edited(copy, "analysis/statistics.json", f'"numpy": "{statistics["versions"]["numpy"]}"', '"numpy": "1.0"')
+    found = verify(copy)
+    assert found.whole == whole
+    (said,) = found.remarks or found.faults
+    assert "preference.means.asymmetric-2 is" in said
+    assert ("other versions" in said) == whole
+
+
+def test_an_archive_without_its_manifest_is_none(copy: Path) -> None:
+    (copy / manifest.MANIFEST).rename(copy / "other.txt")
+    with pytest.raises(
+        PlaceError, match=rf"no archive of Recoil, or not a whole one: {manifest.MANIFEST} is not there"
+    ):
+        verify(copy)
+    (copy / manifest.MANIFEST).symlink_to("other.txt")
+    with pytest.raises(PlaceError, match="is no plain file"):
+        verify(copy)
+
+
+def test_settings_that_say_nothing_are_named(copy: Path) -> None:
+    (copy / "archive.json").write_text("[]")
+    sealed(copy)
+    (fault, *_) = verify(copy).faults
+    assert "archive.json" in fault
+
+
+# where it is put
+
+
+def test_what_is_there_is_never_overwritten(made: tuple[Path, Path, Archived], tmp_path: Path) -> None:
+    study, archive, _ = made
+    before = tree(archive)
+    with pytest.raises(PlaceError, match="is there already, and no archive is overwritten"):
+        archive_export.archive(ArchiveRequest(folder=study, out=archive))
+    with pytest.raises(PlaceError, match="whose logs would then be read twice"):
+        archive_export.archive(ArchiveRequest(folder=study, out=study / "results" / "archive"))
+    with pytest.raises(PlaceError, match="whose logs would then be read twice"):
+        archive_export.archive(ArchiveRequest(folder=study / "results", out=study / "archive"))
+    assert tree(archive) == before
+
+
+def test_a_disk_that_fills_leaves_nothing(
+    made: tuple[Path, Path, Archived], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[Path] = []
+
+    def full(path: Path, data: bytes) -> None:
+        written.append(path)
+        if len(written) == 5:
+            raise OSError(28, "No space left on device")
+        path.write_bytes(data)
+
+    monkeypatch.setattr(placing.storage, "write_whole", full)
+    with pytest.raises(OSError, match="No space left"):
+        archive_export.archive(ArchiveRequest(folder=made[0], out=tmp_path / "archive"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_register_that_cannot_be_trusted_ends_it(made: tuple[Path, Path, Archived], tmp_path: Path) -> None:
+    shutil.copytree(made[0], tmp_path / "study")
+    (tmp_path / "study" / "results" / "participants.jsonl").write_text("{}\n")
+    with pytest.raises(RegisterError, match="someone might be excluded"):
+        archive_export.archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / "archive"))
+    assert not (tmp_path / "archive").exists()
+
+
+def test_logs_that_no_journal_proves_are_no_archive(tmp_path: Path) -> None:
+    from tests.log_files import write_study
+
+    logs = write_study(tmp_path / "logs", 2)
+    with pytest.raises(PlaceError, match="no run has a journal that proves its table"):
+        archive_export.archive(ArchiveRequest(folder=logs, out=tmp_path / "archive"))
+
+
+# as its users call it
+
+
+def test_the_commands(recoil: Recoil, made: tuple[Path, Path, Archived], tmp_path: Path) -> None:
+    study = made[0]
+    shutil.copytree(study, tmp_path / "study", ignore=shutil.ignore_patterns("sub-P0[345]", "*direction*"))
+    for name in ("direction.toml", "study.toml"):
+        shutil.copy(study / name, tmp_path / "study")
+    (tmp_path / "study" / "CITATION.cff").write_text("cff-version: 1.2.0\n")
+    done = recoil("export", "archive", "study", "--json")
+    assert done.returncode == 0, done
+    told = json.loads(done.stdout)
+    assert (told["participants"], told["runs"]) == (2, 2)
+    assert (tmp_path / "study-archive" / "CITATION.cff").read_text() == "cff-version: 1.2.0\n"
+    refused(recoil("export", "archive", "study"), "study-archive: is there already")
+    done = recoil("verify", "study-archive", "--json")
+    assert done.returncode == 0, done
+    assert json.loads(done.stdout)["manifest_sha256"] == told["manifest_sha256"]
+    (tmp_path / "study-archive" / "README.md").unlink()
+    done = recoil("verify", "study-archive")
+    assert done.returncode == 1, done
+    assert "recoil: README.md: missing" in done.stderr
+    refused(recoil("verify", "study"), "is no archive of Recoil")
