@@ -102,4 +102,4 @@ def _stop(path: Path, *, table: bool) -> None:
 
 def sealed(folder: Path) -> None:
     """Write an archive's manifest anew, as a forger would who changed it."""
-    (folder / manifest.MANIFEST).write_bytes(manifest.manifest_bytes(folder))
+    (folder / manifest.MANIFEST_FILE).write_bytes(manifest.manifest_bytes(folder))

@@ -39,7 +39,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Archived
     """The study, its archive, and what was said of it."""
     folder = tmp_path_factory.mktemp("archived")
     study = small_study(folder / "study")
-    done = archive_export.archive(ArchiveRequest(folder=study, out=folder / "archive"))
+    done = archive_export.export_archive(ArchiveRequest(folder=study, out=folder / "archive"))
     return study, folder / "archive", done
 
 
@@ -97,6 +97,7 @@ def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path
         "| preference | broken | 1 | left out: table or journal breaks a rule, or was changed since the run |" in page
     )
     assert "Some participants are synthetic" in page
+    assert "Runs in the archive, and left out" in (archive / "analysis" / "report.md").read_text()
     assert {path.parts[0] for path in (Path(one) for one in tree(archive / "results"))} == {
         *("sub-P01", "sub-P02", "sub-P03", "participants.jsonl"),
         *("task-direction_columns.md", "task-preference_columns.md"),
@@ -183,6 +184,30 @@ def test_free_text_stays_where_it_is_asked_for_but_causes_of_faults_never(
     assert SECRET_PLACES[0] not in told
 
 
+def test_the_clocks_of_computer_and_gun_begin_anew_in_each_stretch_of_a_run(made: tuple[Path, Path, Archived]) -> None:
+    path = made[0] / JOURNAL
+    head = raw(path)[0] | {"monotonic_s": 48086.25}
+    timing = {
+        "written_s": 48090.5,
+        "gun_accepted_us": 7_000_000,
+        "gun_start_us": 7_000_900,
+        "gun_count": 41,
+        "asked": 1,
+    }
+    fired = {"kind": "outcome", "utc": head["utc"], "monotonic_s": 48091.0, "synced_s": 48090.0}
+    fired |= {"body": {"kind": "fired", "pulse_start_s": 48090.75, "timing": timing}}
+    again = {"kind": "resumed", "utc": head["utc"], "monotonic_s": 12.5, "synced_s": None}
+    later = fired | {"monotonic_s": 13.5, "synced_s": 13.0}
+    found = redacted(path, forged([head, fired, fired, again, later]), moment_of(head["utc"]))
+    first, second, _, third = [json.loads(line) for line in found.splitlines()][1:]
+    assert first == second | {"n": 1, "link": first["link"]}
+    assert (first["monotonic_s"], first["synced_s"], first["body"]["pulse_start_s"]) == (4.75, 3.75, 4.5)
+    shown = {"written_s": 4.25, "gun_accepted_us": 0, "gun_start_us": 900, "gun_count": 1, "asked": 1}
+    assert first["body"]["timing"] == shown
+    assert third["monotonic_s"] == 1.0
+    assert third["body"]["timing"]["gun_count"] == 1
+
+
 SAFE = {"gun", "motion", "method", "question", "event", "state", "because", "flag", "kind"}
 """Fields of outcomes and remarks whose text is of the design or the program."""
 
@@ -217,14 +242,14 @@ def test_a_register_says_no_age_above_89_and_nobody_who_is_not_here(made: tuple[
 def test_a_changed_byte_anywhere_is_found_and_its_file_named(copy: Path) -> None:
     draw = random.Random(1)
     files = sorted(tree(copy))
-    for path in [manifest.MANIFEST, *draw.sample(files, 24)]:
+    for path in [manifest.MANIFEST_FILE, *draw.sample(files, 24)]:
         before = (copy / path).read_bytes()
         place = draw.randrange(len(before))
         other = draw.choice([byte for byte in range(256) if byte != before[place]])
         (copy / path).write_bytes(before[:place] + bytes([other]) + before[place + 1 :])
         found = verify(copy)
         assert not found.whole
-        assert path == manifest.MANIFEST or any(fault.startswith(f"{path}: changed") for fault in found.faults)
+        assert path == manifest.MANIFEST_FILE or any(fault.startswith(f"{path}: changed") for fault in found.faults)
         (copy / path).write_bytes(before)
     assert manifest.read_manifest(copy).faults == ()
 
@@ -316,12 +341,12 @@ def test_other_versions_may_differ_by_a_millionth_of_a_millionth(copy: Path, by:
 
 
 def test_an_archive_without_its_manifest_is_none(copy: Path) -> None:
-    (copy / manifest.MANIFEST).rename(copy / "other.txt")
+    (copy / manifest.MANIFEST_FILE).rename(copy / "other.txt")
     with pytest.raises(
-        PlaceError, match=rf"no archive of Recoil, or not a whole one: {manifest.MANIFEST} is not there"
+        PlaceError, match=rf"no archive of Recoil, or not a whole one: {manifest.MANIFEST_FILE} is not there"
     ):
         verify(copy)
-    (copy / manifest.MANIFEST).symlink_to("other.txt")
+    (copy / manifest.MANIFEST_FILE).symlink_to("other.txt")
     with pytest.raises(PlaceError, match="is no plain file"):
         verify(copy)
 
@@ -340,11 +365,11 @@ def test_what_is_there_is_never_overwritten(made: tuple[Path, Path, Archived], t
     study, archive, _ = made
     before = tree(archive)
     with pytest.raises(PlaceError, match="is there already, and no archive is overwritten"):
-        archive_export.archive(ArchiveRequest(folder=study, out=archive))
+        archive_export.export_archive(ArchiveRequest(folder=study, out=archive))
     with pytest.raises(PlaceError, match="whose logs would then be read twice"):
-        archive_export.archive(ArchiveRequest(folder=study, out=study / "results" / "archive"))
+        archive_export.export_archive(ArchiveRequest(folder=study, out=study / "results" / "archive"))
     with pytest.raises(PlaceError, match="whose logs would then be read twice"):
-        archive_export.archive(ArchiveRequest(folder=study / "results", out=study / "archive"))
+        archive_export.export_archive(ArchiveRequest(folder=study / "results", out=study / "archive"))
     assert tree(archive) == before
 
 
@@ -361,7 +386,7 @@ def test_a_disk_that_fills_leaves_nothing(
 
     monkeypatch.setattr(placing.storage, "write_whole", full)
     with pytest.raises(OSError, match="No space left"):
-        archive_export.archive(ArchiveRequest(folder=made[0], out=tmp_path / "archive"))
+        archive_export.export_archive(ArchiveRequest(folder=made[0], out=tmp_path / "archive"))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -369,7 +394,7 @@ def test_a_register_that_cannot_be_trusted_ends_it(made: tuple[Path, Path, Archi
     shutil.copytree(made[0], tmp_path / "study")
     (tmp_path / "study" / "results" / "participants.jsonl").write_text("{}\n")
     with pytest.raises(RegisterError, match="someone might be excluded"):
-        archive_export.archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / "archive"))
+        archive_export.export_archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / "archive"))
     assert not (tmp_path / "archive").exists()
 
 
@@ -378,7 +403,7 @@ def test_logs_that_no_journal_proves_are_no_archive(tmp_path: Path) -> None:
 
     logs = write_study(tmp_path / "logs", 2)
     with pytest.raises(PlaceError, match="no run has a journal that proves its table"):
-        archive_export.archive(ArchiveRequest(folder=logs, out=tmp_path / "archive"))
+        archive_export.export_archive(ArchiveRequest(folder=logs, out=tmp_path / "archive"))
 
 
 # as its users call it

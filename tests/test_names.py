@@ -32,7 +32,7 @@ EXCEPTIONS = {
     "a command, or a function for notebooks, has the name of what it calls": Shared(
         names=(
             "analyze audit bench check design freeze grim percept power read_logs rebuild reproduce run simulate study "
-            "times"
+            "times verify"
         ),
         among=("recoil/commands/*", "recoil/api.py"),
         others=1,

@@ -20,9 +20,9 @@ CHANGES = 200
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def export_archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("archived")
-    archive_export.archive(ArchiveRequest(folder=small_study(folder / "study"), out=folder / "archive"))
+    archive_export.export_archive(ArchiveRequest(folder=small_study(folder / "study"), out=folder / "archive"))
     return folder / "archive"
 
 
@@ -40,7 +40,7 @@ def test_verify_finds_each_of_200_single_byte_changes(archive: Path, soak: Soak)
         path.write_bytes(before)
         name = path.relative_to(archive).as_posix()
         found += not said.whole
-        named += name == manifest.MANIFEST or any(fault.startswith(f"{name}: changed") for fault in said.faults)
+        named += name == manifest.MANIFEST_FILE or any(fault.startswith(f"{name}: changed") for fault in said.faults)
     assert (found, named) == (CHANGES, CHANGES)
     assert verify(archive).whole
     how = f"random file of {len(files)}, random byte, any other value; seed 1"
@@ -49,7 +49,7 @@ def test_verify_finds_each_of_200_single_byte_changes(archive: Path, soak: Soak)
 
 
 def test_every_byte_of_the_manifest_counts(archive: Path, soak: Soak) -> None:
-    path = archive / manifest.MANIFEST
+    path = archive / manifest.MANIFEST_FILE
     before, draw = path.read_bytes(), random.Random(2)
     missed = 0
     for place in range(0, len(before), 7):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from analysis.archive import bids_export, contents, datapackage, manifest, pages, placing, redaction
-from analysis.archive.contents import CONTENTS, Entry, State
+from analysis.archive.contents import CONTENTS, Entry, EntryState
 from analysis.archive.datapackage import Resource
 from analysis.archive.making import (
     ANALYSIS,
     BIDS,
-    REQUESTS,
+    REQUESTS_FILE,
     RESULTS,
-    RULES,
+    RULES_FILE,
     SETTINGS,
     ArchiveSettings,
     analysis_of,
@@ -25,6 +25,7 @@ from analysis.logs.exclusions import Rules
 from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
+from analysis.report.section import Section
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, unseen
 from analysis.summary.analyze import analyze
@@ -85,7 +86,7 @@ class _Run:
         return self.contents.plan.participant_id
 
 
-def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = unseen) -> Archived:
+def export_archive(request: ArchiveRequest, track: Track = iter, progress: Progress = unseen) -> Archived:
     """Write the archive of a study. Whoever looks sees no archive, or the whole.
 
     `PlaceError` if no log is usable, if something is in the archive's place, or if that lies within the study;
@@ -105,10 +106,10 @@ def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = u
         raise PlaceError("\n".join([f"{request.folder}: no run has a journal that proves its table", *reasons]))
     settings = ArchiveSettings(title=title, free_text=request.free_text, include_synthetic=request.include_synthetic)
     given = _citation([request.folder, results, results.parent])
-    entries = [*_entries(runs), *contents.left_out(logs, members, unproven)]
+    entries = [*_entries(runs), *contents.left_out_entries(logs, members, unproven)]
     with placing.in_place(target) as part:
         _write_results(part, runs, members, free_text=request.free_text)
-        _write_analysis(part, request, settings, progress)
+        _write_analysis(part, request, settings, pages.contents_section(entries), progress)
         _write_bids(part, request, settings, results)
         _write_pages(part, settings, entries, _designs(runs))
         placing.write_file(part, CITATION, given or pages.citation(title, recoil_version()))
@@ -116,7 +117,7 @@ def archive(request: ArchiveRequest, track: Track = iter, progress: Progress = u
             placing.write_file(part, f"preregistration/{frozen.name}", frozen.read_bytes())
         _write_package(part, title, runs)
         files = manifest.manifest_bytes(part)
-        placing.write_file(part, manifest.MANIFEST, files)
+        placing.write_file(part, manifest.MANIFEST_FILE, files)
     return Archived(
         out=str(request.out or target),
         manifest_sha256=manifest.read_manifest(target).sha256,
@@ -160,14 +161,15 @@ def _runs(logs: Logs) -> tuple[list[_Run], list[Problem]]:
             if found is None:
                 unproven.append(BadLogError("its journal holds no whole record").of(file, code, experiment, ""))
             else:
-                runs.append(_Run(path=path, data=data, contents=found, kind=part.kind))
+                kind: DataKind = "synthetic" if found.head.participant == "synthetic" else part.kind
+                runs.append(_Run(path=path, data=data, contents=found, kind=kind))
     return runs, unproven
 
 
 def _entries(runs: Iterable[_Run]) -> Iterator[Entry]:
     for run in runs:
         plan = run.contents.plan
-        state: State = "finished" if run.contents.finished else "not finished"
+        state: EntryState = "finished" if run.contents.finished else "not finished"
         yield Entry(participant_id=run.code, experiment=plan.experiment, state=state, kind=run.kind)
 
 
@@ -189,12 +191,14 @@ def _write_results(part: Path, runs: Sequence[_Run], members: Mapping[str, Membe
         placing.write_file(part, f"{RESULTS}/{REGISTER_FILE}", facts)
 
 
-def _write_analysis(part: Path, request: ArchiveRequest, settings: ArchiveSettings, progress: Progress) -> None:
-    for given, path in ((request.rules, RULES), (request.requests, REQUESTS)):
+def _write_analysis(
+    part: Path, request: ArchiveRequest, settings: ArchiveSettings, left_out: Section, progress: Progress
+) -> None:
+    for given, path in ((request.rules, RULES_FILE), (request.requests, REQUESTS_FILE)):
         if given is not None:
             placing.write_file(part, path, given.read_bytes())
     placing.write_file(part, SETTINGS, as_json(settings))
-    analyze(analysis_of(part, settings), progress=progress)
+    analyze(replace(analysis_of(part, settings), extra=(left_out,)), progress=progress)
 
 
 def _write_bids(part: Path, request: ArchiveRequest, settings: ArchiveSettings, results: Path) -> None:
@@ -208,7 +212,7 @@ def _write_bids(part: Path, request: ArchiveRequest, settings: ArchiveSettings, 
 def _write_pages(
     part: Path, settings: ArchiveSettings, entries: Sequence[Entry], designs: Sequence[ArchivedDesign]
 ) -> None:
-    page = pages.readme(settings.title, recoil_version(), entries, free_text=settings.free_text)
+    page = pages.archive_page(settings.title, recoil_version(), entries, free_text=settings.free_text)
     placing.write_file(part, "README.md", page)
     placing.write_file(part, "METHODS.md", pages.methods(designs))
     placing.write_file(part, CONTENTS, contents.contents_table(entries))
@@ -264,6 +268,6 @@ def _tables(part: Path, runs: Iterable[_Run]) -> Iterator[tuple[str, str, bytes]
     for file in sorted((part / ANALYSIS).rglob("*.csv")):
         path = file.relative_to(part).as_posix()
         yield path, path.removesuffix(".csv"), datapackage.schema_of_results(file.read_bytes())
-    yield CONTENTS, "contents", datapackage.schema(contents.COLUMNS)
+    yield CONTENTS, "contents", datapackage.schema(contents.CONTENT_COLUMNS)
     people = (part / BIDS / "participants.tsv").read_text(encoding="utf-8").split("\n", 1)[0]
     yield f"{BIDS}/participants.tsv", "participants", datapackage.schema_of_participants(people.split("\t"))

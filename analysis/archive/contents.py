@@ -16,9 +16,9 @@ from experiments.study.study import Member
 
 CONTENTS = "contents.csv"
 Here = Literal["finished", "not finished"]
-State = Here | Literal["excluded", "begun", "practice", "set aside", "kept out", "no journal", "broken", "no run"]
+EntryState = Here | Literal["excluded", "begun", "practice", "set aside", "kept out", "no journal", "broken", "no run"]
 """How a run stands; only the first two are in an archive."""
-MEANINGS: Mapping[State, str] = {
+MEANINGS: Mapping[EntryState, str] = {
     "finished": "in the archive",
     "not finished": "in the archive as far as it came: the run was stopped before its end",
     "excluded": "left out: the participant was excluded; the reason stands in the study's register alone",
@@ -38,7 +38,7 @@ class Entry:
 
     participant_id: str
     experiment: str
-    state: State
+    state: EntryState
     kind: DataKind | None = None
 
     @property
@@ -47,7 +47,7 @@ class Entry:
         return self.state in get_args(Here)
 
 
-COLUMNS: tuple[Column, ...] = (
+CONTENT_COLUMNS: tuple[Column, ...] = (
     tables.text_column("participant_id", "participant's code; empty where no file says whose it is"),
     tables.text_column("experiment", "which experiment; empty where there is no run"),
     tables.flag_column("in_archive", "1 if the run is in the archive, 0 if it is left out"),
@@ -68,10 +68,12 @@ def contents_table(entries: Iterable[Entry]) -> bytes:
         )
         for one in sorted(entries, key=lambda one: (one.participant_id, one.experiment, one.state))
     )
-    return tables.table_bytes(COLUMNS, rows)
+    return tables.table_bytes(CONTENT_COLUMNS, rows)
 
 
-def left_out(logs: Logs, members: Mapping[str, Member], without_journal: Collection[Problem]) -> Iterator[Entry]:
+def left_out_entries(
+    logs: Logs, members: Mapping[str, Member], without_journal: Collection[Problem]
+) -> Iterator[Entry]:
     """What of a study is not in its archive. `logs` are all of it, `without_journal` those that no journal proves."""
     excluded = {code for code, member in members.items() if member.excluded is not None}
     runs = [run for part in (logs, *logs.apart) for run in part.runs]
@@ -81,7 +83,7 @@ def left_out(logs: Logs, members: Mapping[str, Member], without_journal: Collect
     for begun in logs.begun:
         yield _of_run(begun.file, "begun", excluded)
     for problem in (*logs.problems, *without_journal):
-        state: State = "no journal" if problem in without_journal else _why(problem)
+        state: EntryState = "no journal" if problem in without_journal else _why(problem)
         code = problem.participant or code_in_name(str(problem.file)) or ""
         experiment = problem.experiment or experiment_in_name(str(problem.file))
         yield Entry(participant_id=code, experiment=experiment, state="excluded" if code in excluded else state)
@@ -92,12 +94,12 @@ def left_out(logs: Logs, members: Mapping[str, Member], without_journal: Collect
             yield Entry(participant_id=code, experiment="", state="excluded" if code in excluded else "no run")
 
 
-def _of_run(run: RunFile, state: State, excluded: Collection[str]) -> Entry:
+def _of_run(run: RunFile, state: EntryState, excluded: Collection[str]) -> Entry:
     why = "excluded" if run.participant in excluded else state
     return Entry(participant_id=run.participant, experiment=run.experiment, state=why)
 
 
-def _why(problem: Problem) -> State:
+def _why(problem: Problem) -> EntryState:
     return "kept out" if problem.message in _KEPT_OUT else "broken"
 
 

@@ -11,7 +11,7 @@ from analysis.summary.analyze import Request
 from experiments.config.door import Model, Text, checked_table, read_text
 
 SETTINGS, RESULTS, ANALYSIS, BIDS = "archive.json", "results", "analysis", "bids"
-RULES, REQUESTS = f"{ANALYSIS}/rules.toml", f"{ANALYSIS}/requests.toml"
+RULES_FILE, REQUESTS_FILE = f"{ANALYSIS}/rules.toml", f"{ANALYSIS}/requests.toml"
 
 
 class ArchiveSettings(Model):
@@ -31,7 +31,7 @@ def read_settings(folder: Path) -> ArchiveSettings:
 
 def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
     """The analysis that an archive holds, of the journals and tables in it."""
-    rules, requests = folder / RULES, folder / REQUESTS
+    rules, requests = folder / RULES_FILE, folder / REQUESTS_FILE
     return Request(
         paths=[folder / RESULTS],
         out=folder / ANALYSIS,

@@ -15,7 +15,7 @@ from pathlib import Path
 from analysis.logs.files import shown_name
 from experiments.study.folders import PlaceError
 
-MANIFEST = "manifest-sha256.txt"
+MANIFEST_FILE = "manifest-sha256.txt"
 _LINE = re.compile(r"([0-9a-f]{64})  ([^\x00-\x1f\\]+)")
 
 
@@ -31,26 +31,26 @@ class Hashes:
 def manifest_bytes(folder: Path) -> bytes:
     """The manifest of a folder, of every file but itself."""
     hashes = {path: _sha256(folder / path) for path, kind in _entries(folder) if kind == "file"}
-    hashes.pop(MANIFEST, None)
+    hashes.pop(MANIFEST_FILE, None)
     return _text(hashes).encode()
 
 
 def read_manifest(folder: Path) -> Hashes:
     """The manifest of an archive. `PlaceError` if there is none to read: then the folder is no archive."""
-    path = folder / MANIFEST
+    path = folder / MANIFEST_FILE
     if path.is_symlink() or not path.is_file():
         there = "is no plain file" if path.is_symlink() or path.exists() else "is not there"
-        raise PlaceError(f"{folder}: is no archive of Recoil, or not a whole one: {MANIFEST} {there}")
+        raise PlaceError(f"{folder}: is no archive of Recoil, or not a whole one: {MANIFEST_FILE} {there}")
     data = path.read_bytes()
     lines = data.decode("utf-8", "surrogateescape").split("\n")
     found = {match[2]: match[1] for line in lines if (match := _LINE.fullmatch(line))}
     faults = [
-        f"{MANIFEST}, line {number}: is no hash and path, so it was changed"
+        f"{MANIFEST_FILE}, line {number}: is no hash and path, so it was changed"
         for number, line in enumerate(lines[:-1], start=1)
         if not _LINE.fullmatch(line)
     ]
     if not faults and _text(found).encode("utf-8", "surrogateescape") != data:
-        faults = [f"{MANIFEST}: is not as it was written: order, a doubled path or the end differs"]
+        faults = [f"{MANIFEST_FILE}: is not as it was written: order, a doubled path or the end differs"]
     return Hashes(listed=found, sha256=hashlib.sha256(data).hexdigest(), faults=tuple(faults))
 
 
@@ -58,7 +58,7 @@ def faults(folder: Path, hashes: Hashes) -> Iterator[str]:
     """What of an archive is not what its manifest lists, each with its path: missing, changed, a link, foreign."""
     there = dict(_entries(folder))
     folders = {str(parent) for path in hashes.listed for parent in Path(path).parents}
-    for path in sorted({*hashes.listed, *there} - {MANIFEST}):
+    for path in sorted({*hashes.listed, *there} - {MANIFEST_FILE}):
         kind, listed = there.get(path), hashes.listed.get(path)
         if kind == "folder" and path in folders:
             continue

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.archive.contents import CONTENTS, MEANINGS, Entry
-from analysis.archive.manifest import MANIFEST
+from analysis.archive.manifest import MANIFEST_FILE
+from analysis.report.section import Section, Table
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
@@ -76,13 +77,13 @@ Some participants are synthetic: a simulation answered, not a person (column `da
 """
 
 
-def readme(title: str, version: str, entries: Sequence[Entry], *, free_text: bool) -> bytes:
+def archive_page(title: str, version: str, entries: Sequence[Entry], *, free_text: bool) -> bytes:
     """The page of an archive: what lies where, who is in it and who is not, what is redacted and why."""
     simulated = any(one.kind == "synthetic" for one in entries)
     return _README.format(
         title=title,
         version=version,
-        manifest=MANIFEST,
+        manifest=MANIFEST_FILE,
         contents=CONTENTS,
         counts="\n".join(_counts(entries)),
         synthetic=_SYNTHETIC if simulated else "",
@@ -91,15 +92,31 @@ def readme(title: str, version: str, entries: Sequence[Entry], *, free_text: boo
 
 
 def _counts(entries: Sequence[Entry]) -> Iterator[str]:
-    """How many runs are in which state, with whose they are."""
+    """How many runs are in which state, as Markdown."""
     people = {one.participant_id for one in entries if one.archived}
     yield f"{len(people)} participant{'' if len(people) == 1 else 's'}.\n"
-    yield "| experiment | state | runs | means |"
+    yield f"| {' | '.join(_HEADER)} |"
     yield "| --- | --- | --- | --- |"
+    yield from (f"| {' | '.join(row)} |" for row in _states(entries))
+
+
+_HEADER = ("experiment", "state", "runs", "means")
+
+
+def _states(entries: Sequence[Entry]) -> Iterator[tuple[str, ...]]:
+    """How many runs of each experiment are in which state."""
     counts = Counter((one.experiment, one.state) for one in entries)
     order = {state: place for place, state in enumerate(MEANINGS)}
     for (experiment, state), count in sorted(counts.items(), key=lambda pair: (pair[0][0], order[pair[0][1]])):
-        yield f"| {experiment or '–'} | {state} | {count} | {MEANINGS[state]} |"
+        yield experiment or "–", state, str(count), MEANINGS[state]
+
+
+def contents_section(entries: Sequence[Entry]) -> Section:
+    """The same for the report, which is of the runs in the archive alone."""
+    said = f"This report is of the runs in the archive; {CONTENTS} names each run of the study, by its participant."
+    caption = "Runs of the study, those that are left out too"
+    table = Table(caption=caption, header=_HEADER, rows=tuple(_states(entries)))
+    return Section(title="Runs in the archive, and left out", paragraphs=(said,), tables=(table,))
 
 
 def methods(designs: Iterable[ArchivedDesign]) -> bytes:

@@ -80,7 +80,7 @@ def archive(
         rules=rules,
         requests=requests,
     )
-    done = feature.archive(asked, tracked, progress)
+    done = feature.export_archive(asked, tracked, progress)
     for line in few_of_each(f"left out: {problem}" for problem in done.left_out):
         say(f"recoil: {line}")
     for remark in done.remarks:
