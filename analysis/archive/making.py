@@ -30,7 +30,10 @@ def read_settings(folder: Path) -> ArchiveSettings:
 
 
 def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
-    """The analysis that an archive holds, of the journals and tables in it."""
+    """The analysis that an archive holds, of the journals and tables in it.
+
+    Deviations from a preregistration need the study's files, dates and register: its own report lists them.
+    """
     rules, requests = folder / RULES_FILE, folder / REQUESTS_FILE
     return Request(
         paths=[folder / RESULTS],
@@ -39,6 +42,7 @@ def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
         include_synthetic=settings.include_synthetic,
         rules=rules if rules.is_file() else None,
         requests=requests if requests.is_file() else None,
+        against_frozen=False,
     )
 
 
