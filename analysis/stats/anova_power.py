@@ -13,7 +13,7 @@ from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, quoted
 
-LARGEST_F, MOST_PEOPLE, MOST_CONDITIONS = 1e6, 1e9, 1e6
+LARGEST_EFFECT, MOST_PEOPLE, MOST_CONDITIONS = 1e6, 1e9, 1e6
 MOST_NONCENTRALITY = 1e15
 """Beyond it power is 1 in all digits that the noncentral F has, and beyond 1e20 scipy has none."""
 
@@ -48,7 +48,7 @@ def one_way_anova_power(f: ArrayLike, sizes: ArrayLike, alpha: ArrayLike = 0.05)
     if groups.ndim < 1 or groups.shape[-1] < 2 or (groups < 1.0).any() or (groups.max(axis=-1) < 2.0).any():
         raise ValueError("sizes must be of at least two groups, each at least 1 and one of them at least 2")
     total, k = groups.sum(axis=-1), groups.shape[-1]
-    return _power(_within(f, "f", 0.0, LARGEST_F) ** 2 * total, np.asarray(k - 1.0), total - k, alpha)
+    return _power(_within(f, "f", 0.0, LARGEST_EFFECT) ** 2 * total, np.asarray(k - 1.0), total - k, alpha)
 
 
 def rm_anova_power(
@@ -83,7 +83,7 @@ def rm_anova_power(
         raise ValueError("correlation must lie between -1 / (conditions - 1) and 1")
     if ((e < (1.0 - 1e-12) / (k - 1.0)) | (e > 1.0)).any():
         raise ValueError("epsilon must lie in 1 / (conditions - 1) to 1")
-    noncentrality = _within(f, "f", 0.0, LARGEST_F) ** 2 * n * k * e / (1.0 - rho)
+    noncentrality = _within(f, "f", 0.0, LARGEST_EFFECT) ** 2 * n * k * e / (1.0 - rho)
     return _power(noncentrality, (k - 1.0) * e, (n - 1.0) * (k - 1.0) * e, alpha)
 
 
