@@ -44,11 +44,11 @@ def plan(setup: Setup[DesignConfig], participant: str = "P01", seed: int = 1, or
     from experiments.design.planning import plan_of
     from experiments.design.streams import checked_seed
     from experiments.study.folders import check_code
-    from recoil.arguments import check_setup, refusal
+    from recoil.arguments import argument_error, check_setup
 
     check_setup("setup", setup)
     if not isinstance(participant, str):
-        raise refusal("participant", participant, "a code, such as 'P01'")
+        raise argument_error("participant", participant, "a code, such as 'P01'")
     check_code(participant)
     checked_seed(seed)
     return plan_of(setup.config, participant, seed, row=order_row)
@@ -67,12 +67,12 @@ def run_synthetic(
     from experiments.clock import VirtualClock
     from experiments.run import RunRequest, run
     from experiments.screens.synthetic import synthetic_screen
-    from recoil.arguments import arguments_named, check_setup, path_of, refusal, texts_of
+    from recoil.arguments import argument_error, arguments_named, check_setup, path_of, texts_of
 
     check_setup("setup", setup)
     codes, where = texts_of("participants", participants, "codes", "P01"), path_of("results", results)
     if not codes:
-        raise refusal("participants", participants, "one code or more, such as ['P01']")
+        raise argument_error("participants", participants, "one code or more, such as ['P01']")
     requests = (RunRequest(setup=setup, participant_id=code, results=where, seed=seed) for code in codes)
     with arguments_named():
         return [run(request, synthetic_screen, VirtualClock()).place.table for request in requests]
@@ -187,7 +187,7 @@ def power(
     from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.run import simulated_power
     from experiments.design.streams import checked_seed
-    from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, share_of, texts_of
+    from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, share_argument, texts_of
 
     request = PowerRequest(
         config=file_or_name("config", config),
@@ -196,7 +196,7 @@ def power(
         effects=numbers_of("effects", effects),
         methods=texts_of("methods", methods, "names", "vibration"),
         studies=count_of("studies", studies, 10_000_000),
-        target=share_of("target", target),
+        target=share_argument("target", target),
         seed=checked_seed(seed),
     )
     with arguments_named():

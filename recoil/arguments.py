@@ -19,10 +19,10 @@ _OF_OPTIONS = {"include-synthetic": "include_synthetic=True", "effect": "effects
 _OPTION = re.compile(r"--([a-z][a-z-]*)( \S+:)?")
 
 
-def refusal(name: str, value: object, must: str) -> ConfigError:
+def argument_error(name: str, value: object, must: str) -> ConfigError:
     """The error for an argument that cannot be.
 
-    >>> str(refusal("target", "high", "a number, such as 0.8"))
+    >>> str(argument_error("target", "high", "a number, such as 0.8"))
     "target = 'high': must be a number, such as 0.8"
     """
     try:
@@ -35,11 +35,11 @@ def refusal(name: str, value: object, must: str) -> ConfigError:
 def file_or_name(name: str, value: object) -> str:
     """A file, or the name of a shipped config."""
     if not isinstance(value, str | Path) or not str(value):
-        raise refusal(name, value, "a file or the name of a shipped config, such as 'direction'")
+        raise argument_error(name, value, "a file or the name of a shipped config, such as 'direction'")
     try:
         find(str(value))
     except OSError as error:
-        raise refusal(name, value, f"a file ({error.strerror})") from error
+        raise argument_error(name, value, f"a file ({error.strerror})") from error
     except ConfigError as error:
         raise ConfigError(f"{name} = {error}") from None
     return str(value)
@@ -48,9 +48,9 @@ def file_or_name(name: str, value: object) -> str:
 def path_of(name: str, value: object) -> Path:
     """A file or folder, there or to be made."""
     if not isinstance(value, str | Path) or not str(value):
-        raise refusal(name, value, "a path, such as 'results'")
+        raise argument_error(name, value, "a path, such as 'results'")
     if "\0" in str(value) or any(len(part) > _LONGEST_NAME for part in Path(value).parts):
-        raise refusal(name, value, "a path that a disk takes")
+        raise argument_error(name, value, "a path that a disk takes")
     return Path(value)
 
 
@@ -58,45 +58,45 @@ def file_of(name: str, value: object) -> Path:
     """A file that is there."""
     path = path_of(name, value)
     if not path.is_file():
-        raise refusal(name, str(value), "a file that is there")
+        raise argument_error(name, str(value), "a file that is there")
     return path
 
 
 def flag_of(name: str, value: object) -> bool:
     """True or False."""
     if not isinstance(value, bool):
-        raise refusal(name, value, "True or False")
+        raise argument_error(name, value, "True or False")
     return value
 
 
 def paths_of(name: str, values: Sequence[object]) -> tuple[Path, ...]:
     """One or more files or folders."""
     if not values or not all(isinstance(path, str | Path) and str(path) for path in values):
-        raise refusal(name, values, "files or folders with logs, one argument each")
+        raise argument_error(name, values, "files or folders with logs, one argument each")
     return tuple(path_of(name, path) for path in values)
 
 
 def check_setup(name: str, value: object) -> None:
     """`ConfigError` for what is no loaded config."""
     if not isinstance(value, Setup):
-        raise refusal(name, value, "what load_config gives, such as load_config('direction')")
+        raise argument_error(name, value, "what load_config gives, such as load_config('direction')")
 
 
 def texts_of(name: str, values: object, what: str, example: str) -> tuple[str, ...]:
     """A list of texts; one text alone is none."""
     if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
         shown = values if isinstance(values, str) and values else example
-        raise refusal(name, values, f"a list of {what}, such as [{shown!r}]")
+        raise argument_error(name, values, f"a list of {what}, such as [{shown!r}]")
     found = tuple(values)
     if not all(isinstance(one, str) for one in found):
-        raise refusal(name, values, f"a list of {what}, such as [{example!r}]")
+        raise argument_error(name, values, f"a list of {what}, such as [{example!r}]")
     return found
 
 
 def numbers_of(name: str, values: object) -> str | None:
     """Numbers as the command line takes them; `None` for none."""
     if isinstance(values, bool | bytes | Mapping) or not isinstance(values, str | Real | Iterable):
-        raise refusal(name, values, "a number, a list of numbers, or text such as '8,10,14-20'")
+        raise argument_error(name, values, "a number, a list of numbers, or text such as '8,10,14-20'")
     if isinstance(values, str | Real):
         return str(values)
     return ",".join(map(str, values)) or None
@@ -105,14 +105,14 @@ def numbers_of(name: str, values: object) -> str | None:
 def count_of(name: str, value: object, most: int) -> int:
     """A whole number from 1."""
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise refusal(name, value, f"a whole number from 1 to {most:,}")
+        raise argument_error(name, value, f"a whole number from 1 to {most:,}")
     return value
 
 
-def share_of(name: str, value: object) -> float:
+def share_argument(name: str, value: object) -> float:
     """A number between 0 and 1."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1:
-        raise refusal(name, value, "a number between 0 and 1, such as 0.8")
+        raise argument_error(name, value, "a number between 0 and 1, such as 0.8")
     return value
 
 

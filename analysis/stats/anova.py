@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, entries, float_or_array, quoted, share
+from analysis.stats.arrays import FloatArray, Values, float_or_array, in_brief, row_labels, share
 from analysis.stats.frames import GroupTable, Label, Result, Results, ScoreTable, named_groups, named_scores
 from analysis.stats.studentized_range import studentized_range_isf, studentized_range_sf
 from analysis.stats.sums_of_squares import Sums, between_sums, repeated_sums, unscaled
@@ -155,9 +155,9 @@ def condition_names(labels: Sequence[Label] | None, k: int) -> Sequence[Label]:
     """The labels of k conditions, numbers without them; `ValueError` unless there are k different ones."""
     if labels is None:
         return range(k)
-    names = entries(labels, "labels")
+    names = row_labels(labels, "labels")
     if len(names) != k or len(set(names)) != k:
-        raise ValueError(f"labels: {k} different labels are needed, not {quoted(labels)}")
+        raise ValueError(f"labels: {k} different labels are needed, not {in_brief(labels)}")
     return cast("Sequence[Label]", names)
 
 

@@ -24,7 +24,7 @@ from scipy import special
 from scipy.optimize import minimize
 
 from analysis.stats.anova import F_UNDEFINED, NO_ERROR, check_groups, check_scores, one_table
-from analysis.stats.arrays import FloatArray, scale_of
+from analysis.stats.arrays import FloatArray, scale_number
 from analysis.stats.diagnostics import unit_scaled
 from analysis.stats.frames import GroupTable, Result, ScoreTable
 from analysis.stats.sums_of_squares import between_sums, repeated_sums
@@ -74,7 +74,7 @@ def rm_anova_bayes_factor(
     44.01
     """
     array = one_table(check_scores(scores))
-    of_conditions, of_people = scale_of(fixed_scale, "fixed_scale"), scale_of(random_scale, "random_scale")
+    of_conditions, of_people = scale_number(fixed_scale, "fixed_scale"), scale_number(random_scale, "random_scale")
     n, k = array.shape
     sums = repeated_sums(array)
     effect, people, error = (float(part) for part in (sums.effect, sums.participants, sums.error))
@@ -97,7 +97,7 @@ def one_way_bayes_factor(groups: GroupTable, fixed_scale: float = FIXED_SCALE) -
     >>> round(one_way_bayes_factor([[1.0, 2.0, 3.0], [2.0, 3.0, 4.0], [6.0, 7.0, 8.0]]).bf10, 2)
     17.48
     """
-    arrays, scale = check_groups(groups), scale_of(fixed_scale, "fixed_scale")
+    arrays, scale = check_groups(groups), scale_number(fixed_scale, "fixed_scale")
     if any(array.ndim != 1 for array in arrays):
         raise ValueError("groups must have one axis each, the values of its people")
     sums = between_sums(arrays)

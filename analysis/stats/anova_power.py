@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, quoted
+from analysis.stats.arrays import FloatArray, Values, float_or_array, in_brief, numbers
 
-LARGEST_EFFECT, MOST_PEOPLE, MOST_CONDITIONS = 1e6, 1e9, 1e6
+LARGEST_EFFECT, MOST_PARTICIPANTS, MOST_CONDITIONS = 1e6, 1e9, 1e6
 MOST_NONCENTRALITY = 1e15
 """Beyond it power is 1 in all digits that the noncentral F has, and beyond 1e20 scipy has none."""
 
@@ -30,7 +30,7 @@ def cohens_f(eta_squared: ArrayLike) -> Values:
     """
     array = numbers(eta_squared, "eta_squared")
     if ((array < 0.0) | (array >= 1.0)).any():
-        raise ValueError(f"eta_squared must lie in 0 to 1, which it does not reach, not {quoted(eta_squared)}")
+        raise ValueError(f"eta_squared must lie in 0 to 1, which it does not reach, not {in_brief(eta_squared)}")
     return float_or_array(np.sqrt(array / (1.0 - array)))
 
 
@@ -44,7 +44,7 @@ def one_way_anova_power(f: ArrayLike, sizes: ArrayLike, alpha: ArrayLike = 0.05)
     >>> round(one_way_anova_power(0.25, [45, 45, 45]), 3)  # Cohen's medium effect
     0.732
     """
-    groups = _within(sizes, "sizes", 0.0, MOST_PEOPLE)
+    groups = _within(sizes, "sizes", 0.0, MOST_PARTICIPANTS)
     if groups.ndim < 1 or groups.shape[-1] < 2 or (groups < 1.0).any() or (groups.max(axis=-1) < 2.0).any():
         raise ValueError("sizes must be of at least two groups, each at least 1 and one of them at least 2")
     total, k = groups.sum(axis=-1), groups.shape[-1]
@@ -75,7 +75,7 @@ def rm_anova_power(
     28
     """
     n, k = (
-        _within(participants, "participants", 2.0, MOST_PEOPLE),
+        _within(participants, "participants", 2.0, MOST_PARTICIPANTS),
         _within(conditions, "conditions", 2.0, MOST_CONDITIONS),
     )
     rho, e = numbers(correlation, "correlation"), numbers(epsilon, "epsilon")
@@ -90,7 +90,7 @@ def rm_anova_power(
 def _within(values: ArrayLike, name: str, low: float, high: float) -> FloatArray:
     array = numbers(values, name)
     if ((array < low) | (array > high)).any():
-        raise ValueError(f"{name} must be at least {low:g} and at most {high:,.0f}, not {quoted(values)}")
+        raise ValueError(f"{name} must be at least {low:g} and at most {high:,.0f}, not {in_brief(values)}")
     return array
 
 
@@ -98,7 +98,7 @@ def _power(noncentrality: FloatArray, df_effect: FloatArray, df_error: FloatArra
     """P(F' > F_alpha); without an effect the level itself."""
     level = numbers(alpha, "alpha")
     if ((level <= 0.0) | (level >= 1.0)).any():
-        raise ValueError(f"alpha must lie between 0 and 1, not {quoted(alpha)}")
+        raise ValueError(f"alpha must lie between 0 and 1, not {in_brief(alpha)}")
     critical = special.fdtri(df_effect, df_error, 1.0 - level)
     power = 1.0 - special.ncfdtr(df_effect, df_error, np.minimum(noncentrality, MOST_NONCENTRALITY), critical)
     return float_or_array(np.where(noncentrality > 0.0, power, level))

@@ -76,42 +76,42 @@ def whole(value: ArrayLike, name: str, low: int, high: float = math.inf) -> int:
     found = single(value, name)
     if found != math.floor(found) or not low <= found <= high:
         end = "" if math.isinf(high) else f" to {high:,.0f}"
-        raise ValueError(f"{name} must be a whole number from {low}{end}, not {quoted(value)}")
+        raise ValueError(f"{name} must be a whole number from {low}{end}, not {in_brief(value)}")
     return int(found)
 
 
 _SMALLEST_SCALE, _LARGEST_SCALE = 1e-6, 1e6
 
 
-def scale_of(value: ArrayLike, name: str) -> float:
+def scale_number(value: ArrayLike, name: str) -> float:
     """`value` as one number of 0.000001 to 1,000,000, else `ValueError` naming it: the scale of a prior or a fence."""
     found = single(value, name)
     if not _SMALLEST_SCALE <= found <= _LARGEST_SCALE:
-        raise ValueError(f"{name} must be above 0, at least 0.000001, and at most 1,000,000, not {quoted(value)}")
+        raise ValueError(f"{name} must be above 0, at least 0.000001, and at most 1,000,000, not {in_brief(value)}")
     return found
 
 
 def one_of(value: object, name: str, options: Sequence[str]) -> str:
     """`value` if it is one of the words, else `ValueError` naming it and them."""
     if not isinstance(value, str) or value not in options:
-        raise ValueError(f"{name} must be one of {', '.join(options)}, not {quoted(value)}")
+        raise ValueError(f"{name} must be one of {', '.join(options)}, not {in_brief(value)}")
     return value
 
 
-def entries(values: object, name: str) -> list[Hashable]:
+def row_labels(values: object, name: str) -> list[Hashable]:
     """What says of each row or condition whose or which it is: a list, an array or a column, with an order.
 
     `ValueError` naming it: anything else, or an entry that is missing or itself a list.
 
-    >>> entries(("P1", "P2"), "people")
+    >>> row_labels(("P1", "P2"), "people")
     ['P1', 'P2']
     """
     if isinstance(values, str | bytes) or not (isinstance(values, Sequence) or getattr(values, "ndim", 0) == 1):
-        raise ValueError(f"{name} must be a list or column, not {quoted(values)}")
+        raise ValueError(f"{name} must be a list or column, not {in_brief(values)}")
     found = list(cast("Sequence[Hashable]", values))
     for place, one in enumerate(found):
         if not _is_name(one):
-            raise ValueError(f"{name} must be a list of names, but the one at index {place} is {quoted(one)}")
+            raise ValueError(f"{name} must be a list of names, but the one at index {place} is {in_brief(one)}")
     return found
 
 
@@ -125,7 +125,7 @@ def _is_name(value: object) -> bool:
         return False
 
 
-def quoted(value: object) -> str:
+def in_brief(value: object) -> str:
     """A value as a message shows it: cut where it would hide the message."""
     try:
         text = repr(value)
@@ -145,7 +145,7 @@ def _first_stranger(array: NDArray[np.generic]) -> str:
     for place, value in np.ndenumerate(array):
         if not isinstance(value, Real | Decimal | np.bool_) or _signals(value):
             found = value.item() if isinstance(value, np.generic) else value
-            return f"{_at(place)} {quoted(found)}"
+            return f"{_at(place)} {in_brief(found)}"
     return ""
 
 
@@ -164,7 +164,7 @@ def share(value: ArrayLike, name: str) -> float:
     """`value` if it lies strictly between 0 and 1, else `ValueError` naming it."""
     found = single(value, name)
     if not 0.0 < found < 1.0:
-        raise ValueError(f"{name} must lie between 0 and 1, not {quoted(value)}")
+        raise ValueError(f"{name} must lie between 0 and 1, not {in_brief(value)}")
     return found
 
 

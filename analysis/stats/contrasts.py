@@ -10,7 +10,7 @@ import numpy as np
 from scipy import special
 
 from analysis.stats.anova import check_scores, one_table, own_pairs
-from analysis.stats.arrays import FloatArray, numbers, quoted, share
+from analysis.stats.arrays import FloatArray, in_brief, numbers, share
 from analysis.stats.corrections import Correction, corrected
 from analysis.stats.frames import Result, Results, ScoreTable
 from analysis.stats.paired import CONSTANT, EQUAL
@@ -64,7 +64,7 @@ def planned_contrasts(
     array = one_table(check_scores(scores))
     if not isinstance(weights, Mapping):
         raise ValueError(
-            f"weights must be those of each contrast by its name, {{name: weights}}, not {quoted(weights)}"
+            f"weights must be those of each contrast by its name, {{name: weights}}, not {in_brief(weights)}"
         )
     tests = [_contrast(array, name, _checked(name, some, array.shape[1]), confidence) for name, some in weights.items()]
     adjusted = iter(corrected([test.p for test in tests if test.p is not None], correction).tolist())
@@ -74,7 +74,7 @@ def planned_contrasts(
 def _checked(name: str, weights: Sequence[float], k: int) -> FloatArray:
     array = numbers(weights, f"weights of {name!r}")
     if array.shape != (k,):
-        raise ValueError(f"weights of {name!r}: {k} numbers are needed, one a condition, not {quoted(weights)}")
+        raise ValueError(f"weights of {name!r}: {k} numbers are needed, one a condition, not {in_brief(weights)}")
     largest, total = float(np.abs(array).max()), math.fsum(array)
     if largest == 0.0 or abs(total) > _UNBALANCED * largest:
         raise ValueError(

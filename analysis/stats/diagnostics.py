@@ -12,7 +12,7 @@ from scipy import special, stats
 from scipy.optimize import brentq
 
 from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, one_table, rm_anova, scores_and_names
-from analysis.stats.arrays import FloatArray, pingouin, quoted, scale_of, share
+from analysis.stats.arrays import FloatArray, in_brief, pingouin, scale_number, share
 from analysis.stats.frames import Label, Result, Results, ScoreTable, named_scores
 from analysis.stats.sums_of_squares import repeated_sums
 
@@ -118,7 +118,7 @@ def outliers(scores: ScoreTable, reach: float = 1.5) -> Results[Outlier]:
     >>> outliers([[1, 4], [2, 5], [2, 5], [3, 6], [30, 5]])[0].score
     30.0
     """
-    array, reach = one_table(named_scores(scores, "scores")[0]), scale_of(reach, "reach")
+    array, reach = one_table(named_scores(scores, "scores")[0]), scale_number(reach, "reach")
     if not array.size:
         raise ValueError(f"scores must be of at least 1 participant and 1 condition, not of shape {array.shape}")
     lower, upper = np.quantile(array, [0.25, 0.75], axis=0)
@@ -273,7 +273,7 @@ def effect_size(anova: RepeatedMeasuresAnova) -> EffectSize:
     (0.812, (0.283, 0.871))
     """
     if not isinstance(anova, RepeatedMeasuresAnova):
-        raise ValueError(f"anova must be what rm_anova gives, not {quoted(anova)}")
+        raise ValueError(f"anova must be what rm_anova gives, not {in_brief(anova)}")
     if np.ndim(anova.F):
         raise ValueError(f"anova must be that of one data set, not of an array {np.shape(anova.F)} of them")
     F, partial, generalized = (

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from analysis.stats.anova import own_pairs
-from analysis.stats.arrays import FloatArray, numbers, quoted, single
+from analysis.stats.arrays import FloatArray, in_brief, numbers, single
 from analysis.stats.frames import Result
 
 NO_VARIANCE = "There is no variance, so there is no test: the mean itself says on which side of the bounds it lies."
@@ -87,7 +87,7 @@ def tost_two_samples(
     """
     first, second = _sample(a, "a"), _sample(b, "b")
     if not isinstance(equal_variances, bool | np.bool_):
-        raise ValueError(f"equal_variances must be True or False, not {quoted(equal_variances)}")
+        raise ValueError(f"equal_variances must be True or False, not {in_brief(equal_variances)}")
     (mean_a, se_a), (mean_b, se_b) = _mean_and_se(first), _mean_and_se(second)
     degrees = first.size - 1.0, second.size - 1.0
     if equal_variances:

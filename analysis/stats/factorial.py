@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import helmert
 from scipy.stats import f as f_distribution
 
-from analysis.stats.arrays import FloatArray, entries, quoted
+from analysis.stats.arrays import FloatArray, in_brief, row_labels
 from analysis.stats.frames import Result, Results, ScoreTable, named_scores
 
 
@@ -83,17 +83,17 @@ def factorial_anova(
     [('damper',), ('voltage',), ('damper', 'voltage')]
     """
     array = named_scores(scores, "scores")[0]
-    factors = list(map(str, entries(names, "names")))
+    factors = list(map(str, row_labels(names, "names")))
     within = factors if group is None else factors[1:]
     if array.ndim != 1 + len(within) or min(array.shape) < 2:
         raise ValueError(
             f"scores must be (people, levels, ...) of {len(within)} factors, each at least 2, not {array.shape}"
         )
-    groups = np.array([""] * len(array) if group is None else list(map(str, entries(group, "group"))))
+    groups = np.array([""] * len(array) if group is None else list(map(str, row_labels(group, "group"))))
     sizes = {str(one): int((groups == one).sum()) for one in np.unique(groups)}
     if group is not None and (len(groups) != len(array) or len(sizes) < 2 or min(sizes.values()) < 2):
         raise ValueError(
-            f"group must be one for each of the {len(array)} people, at least two groups of two, not {quoted(sizes)}"
+            f"group must be one for each of the {len(array)} people, at least two groups of two, not {in_brief(sizes)}"
         )
     strata = [_stratum(array, groups, some) for some in _subsets(len(within))]
     all_left = sum(stratum.left for stratum in strata)

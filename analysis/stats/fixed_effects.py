@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.stats.arrays import FloatArray, by_row, entries, numbers, one_of, quoted
+from analysis.stats.arrays import FloatArray, by_row, in_brief, numbers, one_of, row_labels
 from analysis.stats.frames import Result, Results
 
 INTERCEPT = "intercept"
@@ -49,10 +49,10 @@ def indicators(levels: Sequence[str], reference: str | None = None) -> dict[str,
     >>> {name: column.tolist() for name, column in indicators(["a", "b", "c", "b"]).items()}
     {'b': [0.0, 1.0, 0.0, 1.0], 'c': [0.0, 0.0, 1.0, 0.0]}
     """
-    each = list(map(str, entries(levels, "levels")))
+    each = list(map(str, row_labels(levels, "levels")))
     names = list(dict.fromkeys(each))
     if len(names) < 2:
-        raise ValueError(f"levels: at least two are needed, not {quoted(names)}")
+        raise ValueError(f"levels: at least two are needed, not {in_brief(names)}")
     first = names[0] if reference is None else one_of(reference, "reference", names)
     given = np.array(each)
     return {name: (given == name).astype(np.float64) for name in names if name != first}
@@ -64,7 +64,7 @@ def people_codes(people: Sequence[Hashable], rows: int) -> NDArray[np.intp]:
     >>> people_codes(["P2", "P1", "P2"], 3).tolist()
     [0, 1, 0]
     """
-    each = entries(people, "people")
+    each = row_labels(people, "people")
     if len(each) != rows:
         raise ValueError(f"people must say whose each row is: there are {len(each)} for {rows} rows")
     codes: NDArray[np.intp] = pd.factorize(np.fromiter(each, dtype=object, count=rows))[0]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.report.serial import NotebookResult, plain
-from analysis.stats.arrays import FloatArray, numbers, quoted
+from analysis.stats.arrays import FloatArray, in_brief, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +49,7 @@ def named_groups(groups: GroupTable, name: str) -> tuple[list[FloatArray], tuple
         return [numbers(group, f"{name}[{key!r}]") for key, group in groups.items()], _labels(groups)
     listed = isinstance(groups, Sequence) and not isinstance(groups, str | bytes)
     if not listed and getattr(groups, "ndim", 0) < 1:
-        raise ValueError(f"{name} must be a sequence or mapping of arrays, one a group, not {quoted(groups)}")
+        raise ValueError(f"{name} must be a sequence or mapping of arrays, one a group, not {in_brief(groups)}")
     return [numbers(cast("ArrayLike", group), f"{name}[{i}]") for i, group in enumerate(groups)], None
 
 
@@ -115,10 +115,12 @@ def groups_of(table: pd.DataFrame, *, group: str, score: str) -> dict[str, Float
 
 def _there(table: pd.DataFrame, **wanted: object) -> None:
     if not is_frame(table):
-        raise ValueError(f"table must be a DataFrame, not {quoted(table)}")
+        raise ValueError(f"table must be a DataFrame, not {in_brief(table)}")
     for argument, column in wanted.items():
         if not isinstance(column, str) or column not in table.columns:
-            raise ValueError(f"{argument}={quoted(column)}: no such column; the table has {', '.join(map(str, table))}")
+            raise ValueError(
+                f"{argument}={in_brief(column)}: no such column; the table has {', '.join(map(str, table))}"
+            )
 
 
 class Result(NotebookResult):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy import special, stats
 
 from analysis.stats.anova import check_scores, one_table, own_pairs, pairs_of, scores_and_names
-from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, scale_of, share, single, whole
+from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, scale_number, share, single, whole
 from analysis.stats.corrections import holm
 from analysis.stats.frames import Label, Result, Results, ScoreTable
 
@@ -35,7 +35,7 @@ def jzs_paired(t: float, n: int, r: float = SCALE) -> float | None:
     >>> round(jzs_paired(3.5, 20), 3)
     17.185
     """
-    t, n, r = single(t, "t"), whole(n, "n", 2), scale_of(r, "r")
+    t, n, r = single(t, "t"), whole(n, "n", 2), scale_number(r, "r")
     if abs(t) > LARGEST_T:
         return None
     try:
