@@ -1,5 +1,5 @@
 # Two commands for a fresh machine: `make reproduce` and `make test`. Both set up what they need.
-.PHONY: setup full reproduce lint test quick checkers coverage soak lock reference clean
+.PHONY: setup full reproduce lint test quick checkers coverage docs pictures soak lock reference clean
 
 setup: .venv/.ready
 
@@ -35,6 +35,20 @@ checkers: setup
 coverage: full
 	scripts/system-packages
 	scripts/test --cov --cov-report term
+
+.venv/.ready-docs: requirements/full.txt requirements/docs.txt requirements/uv.txt pyproject.toml scripts/setup
+	scripts/setup docs
+
+# The pages under docs/ as a site in docs/_build/html; every command and block of code in them and in the README is run
+docs: .venv/.ready-docs
+	.venv/bin/python -m docs.generate
+	.venv/bin/python -m docs.run_blocks
+	.venv/bin/sphinx-build --fail-on-warning --keep-going --quiet --fresh-env docs docs/_build/html
+
+# The pictures in docs/pictures, made again: the console and the participant's screen on a virtual display, and figures
+pictures: .venv/.ready-docs
+	scripts/system-packages
+	.venv/bin/python -m docs.pictures
 
 # The full figures of every promise, kept as tables under results/soak/
 soak: full
