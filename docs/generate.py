@@ -1,0 +1,245 @@
+"""The reference pages that follow from the code: `python -m docs.generate` writes them to `docs/reference/generated`."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from device.parameters import GunParameters, VibrationParameters
+from docs import statistics_schema
+from experiments.record.dictionary import dictionary
+from recoil.cli import app
+from recoil.config_files import schemas
+
+HERE = Path(__file__).parent / "reference"
+OUT = HERE / "generated"
+CONFIGS = Path(__file__).parent.parent / "configs"
+UNITS = {"s": "s", "N": "N", "V": "V", "kg": "kg", "m": "m", "ohm": "Ω", "H": "H", "Hz": "Hz", "years": "years"}
+COMPOUND = {"V_s_m": "V·s/m", "N_A": "N/A", "N_m": "N/m", "m_s2": "m/s²"}
+SHIPPED = {
+    "design": "direction.toml",
+    "gun": "gun.toml",
+    "study": "study.toml",
+    "synthetic": "synthetic/direction.toml",
+}
+"""The shipped file whose values are shown beside the defaults."""
+EXAMPLES_OF = {"columns": "examples/columns.toml", "rules": "examples/rules.toml", "requests": "examples/requests.toml"}
+KINDS = {
+    "design": "a study's design",
+    "gun": "a gun and its rendering methods",
+    "study": "a study: its people and experiments",
+    "synthetic": "simulated participants",
+    "paper": "published numbers",
+    "columns": "a map of another program's columns",
+    "rules": "exclusions",
+    "requests": "further tests and models",
+    "codebook": "codes of free descriptions",
+}
+
+
+def pages() -> dict[str, str]:
+    """The pages by file name."""
+    made = {f"config-{kind}.md": _config_page(kind, json.loads(text)) for kind, text in _schemas().items()}
+    made["commands.md"] = _commands_page()
+    made["columns.md"] = dictionary()
+    made["statistics.md"] = statistics_schema.page()
+    made["statistics.schema.json"] = statistics_schema.text()
+    return made
+
+
+def _schemas() -> dict[str, bytes]:
+    found = {name.removesuffix(".json"): text for name, text in schemas().items()}
+    return {kind: found[kind] for kind in KINDS}
+
+
+def table(header: tuple[str, ...], rows: Iterator[tuple[str, ...]] | list[tuple[str, ...]]) -> str:
+    """A table in Markdown."""
+    lines = (header, tuple("---" for _ in header), *rows)
+    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |\n" for line in lines)
+
+
+# configs
+
+
+def _config_page(kind: str, schema: dict[str, Any]) -> str:
+    meanings = tomllib.loads((HERE / "keys.toml").read_text(encoding="utf-8"))
+    shipped = SHIPPED.get(kind) or EXAMPLES_OF.get(kind)
+    parts = {kind: schema} | schema.get("$defs", {})
+    once = Counter(key for part in parts.values() for key in part.get("properties", {}))
+    found = _comments(CONFIGS / shipped) if shipped else {}
+    notes = {key: note for key, note in found.items() if once[key] == 1}
+    head = f"# {kind}.toml: {KINDS[kind]}\n\n"
+    if shipped:
+        head += f"“In the shipped file” is `configs/{shipped}`, with the comment that stands there.\n\n"
+    return head + "\n".join(_part(kind, name, part, meanings, notes) for name, part in parts.items()) + _numbers(kind)
+
+
+def _part(kind: str, name: str, part: dict[str, Any], meanings: Mapping[str, Any], notes: Mapping[str, str]) -> str:
+    keys, said = part.get("properties", {}), meanings.get(name, {})
+    if set(keys) != set(said):
+        wrong = ", ".join(sorted(set(keys) ^ set(said)))
+        raise SystemExit(f"docs/reference/keys.toml: [{name}]: {wrong}: a key without a meaning, or no such key")
+    title = "Top of the file" if name == kind else f"`{name}`"
+    about = "" if name == kind else inspect.cleandoc(part.get("description", "")).replace("\n", " ") + "\n\n"
+    required = set(part.get("required", ()))
+    rows = [
+        (
+            f"`{key}`",
+            _type(key_schema),
+            _unit(key),
+            _default(key_schema, key in required),
+            said[key],
+            notes.get(key, ""),
+        )
+        for key, key_schema in keys.items()
+    ]
+    return f"## {title}\n\n{about}" + table(("key", "type", "unit", "default", "meaning", "in the shipped file"), rows)
+
+
+def _type(schema: dict[str, Any]) -> str:
+    if "anyOf" in schema:
+        return " or ".join(dict.fromkeys(_type(one) for one in schema["anyOf"] if one.get("type") != "null"))
+    if "oneOf" in schema:
+        return "one of: " + ", ".join(_type(one) for one in schema["oneOf"])
+    if "$ref" in schema:
+        return f"table `{schema['$ref'].rpartition('/')[2]}`"
+    if "enum" in schema or "const" in schema:
+        return ", ".join(f"`{one}`" for one in schema.get("enum", [schema.get("const")]))
+    if schema.get("type") == "array":
+        return f"list of {_type(schema['items'])}" if "items" in schema else "list"
+    if schema.get("type") == "object":
+        inner = schema.get("additionalProperties")
+        return f"table of {_type(inner)}" if isinstance(inner, dict) and inner else "table"
+    return _bounded(schema)
+
+
+def _bounded(schema: dict[str, Any]) -> str:
+    name = {"string": "text", "integer": "whole number", "boolean": "`true` or `false`"}.get(
+        schema.get("type", ""), "number"
+    )
+    signs = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
+    bounds = [f"{word} {schema[key]:g}" for key, word in signs.items() if key in schema and abs(schema[key]) < 2**62]
+    return " ".join([name, *bounds])
+
+
+def _unit(key: str) -> str:
+    for end, unit in COMPOUND.items():
+        if key.endswith(f"_{end}"):
+            return unit
+    return UNITS.get(key.rpartition("_")[2], "years" if "_years_" in key else "") if "_" in key else ""
+
+
+def _default(schema: dict[str, Any], required: bool) -> str:
+    if required:
+        return "*required*"
+    value = schema.get("default")
+    return "" if value in (None, [], {}, "") or isinstance(value, dict) else f"`{json.dumps(value)}`"
+
+
+def _comments(path: Path) -> dict[str, str]:
+    """The value and comment of each key that stands on one line of a shipped file, the first if it comes again."""
+    found: dict[str, str] = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if read := re.match(r"#? ?([A-Za-z_]+) = ([^#\n]*[^#\s\[])\s*(?:#\s*(.*))?$", line):
+            key, value, comment = read.groups()
+            shown = value if len(value) < 40 else value[:37] + "..."
+            found.setdefault(key, f"`{shown}`" + (f" — {comment}" if comment else ""))
+    return found
+
+
+def _numbers(kind: str) -> str:
+    """The gun's own parameters with their sources."""
+    if kind != "gun":
+        return ""
+    return "\n" + "\n".join(
+        f"## `[{name}]`\n\n" + table(("key", "unit", "default", "symbol, source"), _parameters(numbers))
+        for name, numbers in {"voice_coil": GunParameters, "vibration": VibrationParameters}.items()
+    )
+
+
+def _parameters(numbers: type) -> Iterator[tuple[str, ...]]:
+    source = inspect.getsource(numbers)
+    for one in fields(numbers):
+        comment = re.search(rf"^    {one.name}: .*?#\s*(.*)$", source, re.MULTILINE)
+        default = "" if one.default is MISSING or one.default is None else f"`{one.default}`"
+        yield f"`{one.name}`", _unit(one.name), default, comment[1] if comment else ""
+
+
+# commands
+
+
+def _commands_page() -> str:
+    """Every command by group, with an example that is run, and what `--help` says."""
+    groups = tomllib.loads((HERE / "commands.toml").read_text(encoding="utf-8"))
+    commands = dict(_commands(typer.main.get_command(app), "recoil"))
+    named = [name for group in groups["groups"] for name in group["commands"]]
+    if sorted(named) != sorted(commands):
+        wrong = ", ".join(sorted(set(named) ^ set(commands)))
+        raise SystemExit(f"docs/reference/commands.toml: {wrong}: not there, or no such command")
+    head = f"# The command line\n\n{groups['about']}\n{groups['first']}"
+    return head + "".join(_group(group, commands) for group in groups["groups"])
+
+
+def _group(group: Mapping[str, Any], commands: Mapping[str, Any]) -> str:
+    return f"\n## {group['name']}\n\n" + "\n".join(
+        f"### {name}\n\n{commands[name].help}\n\n{example}\n{_options(commands[name])}"
+        for name, example in group["commands"].items()
+    )
+
+
+def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(command, TyperGroup):
+        for inner, one in command.commands.items():
+            yield from _commands(one, f"{name} {inner}")
+    else:
+        yield name, command
+
+
+def _options(command: Any) -> str:
+    rows = [
+        (
+            _names(one),
+            one.help or "",
+            "" if one.default in (None, False, "", ()) or one.required else f"`{_shown(one.default)}`",
+        )
+        for one in command.params
+        if one.name != "help"
+    ]
+    return table(("option", "meaning", "default"), rows)
+
+
+def _names(one: Any) -> str:
+    if one.param_type_name == "argument":
+        return f"`{(one.metavar or one.name.upper()).strip('{}')}`"
+    metavar = "" if one.is_flag else one.metavar or _kind(one.type_descriptor.annotation)
+    return f"`{' '.join([one.opts[0], metavar]).strip()}`"
+
+
+def _kind(annotation: Any) -> str:
+    """What an option takes, in a word."""
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        return "|".join(one.value for one in annotation)
+    return {int: "N", float: "X", Path: "PATH"}.get(annotation, "TEXT")
+
+
+def _shown(value: object) -> str:
+    return str(getattr(value, "value", value))
+
+
+if __name__ == "__main__":
+    OUT.mkdir(exist_ok=True)
+    for name, content in pages().items():
+        (OUT / name).write_text(content, encoding="utf-8")
+    sys.exit(0)

@@ -1,0 +1,264 @@
+"""Every block of code in the pages and the README is run: `python -m docs.run_blocks`, or with the pages to run.
+
+The blocks of a page are carried out in order, from an empty folder.
+The word behind the language of a fence says what is done with the block:
+
+- `bash` is carried out by bash, where `recoil` is this one; it goes on in the folder that the block before left.
+- `python` is carried out in one namespace a page.
+- `toml`, `csv` with `file=NAME` are written to that file (`more=NAME` adds to its end); TOML without a name is parsed.
+- `text output` is compared with what the block before printed; `...` stands for anything.
+- `exit=N` is the exit code that the block ends with, 0 unless given.
+- `hardware` marks what needs a gun, a display or a person, `make` what `.ci/run` carries out itself: neither is run,
+  but every command in them, and every command in the text, must be one that there is, with the options that it has.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import io
+import multiprocessing
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import typer
+from typer.core import TyperGroup
+
+from recoil.cli import app
+from tests import warm_start
+
+ROOT = Path(__file__).parent.parent
+BUILT = ("_build",)
+SHOWN = {"", "text", "r", "json", "csv", "html"}
+"""Languages of blocks that are only looked at."""
+RULES = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+INLINE = re.compile(r"`(recoil [^`]+|make [a-z]+)`")
+PLACEHOLDER = re.compile(r"^\W*$")
+
+
+class BlockError(Exception):
+    """A block that does not do what its page says, with page and line."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page; `line` is that of its first line of code."""
+
+    page: Path
+    line: int
+    language: str
+    words: tuple[str, ...]
+    text: str
+
+    def named(self, key: str) -> str | None:
+        """What a word `key=value` behind the language says."""
+        return next((word.partition("=")[2] for word in self.words if word.startswith(f"{key}=")), None)
+
+    def error(self, what: str) -> BlockError:
+        """That it went wrong here."""
+        return BlockError(f"{self.page}:{self.line}: {what}")
+
+
+@dataclass
+class Reader:
+    """Somebody who follows a page: where they are, what they have defined, what was printed last."""
+
+    folder: Path
+    names: dict[str, object] = field(default_factory=dict)
+    printed: str = ""
+
+    def follow(self, block: Block) -> None:
+        """Do what a block says; `BlockError` if it does not come out."""
+        if "hardware" in block.words or "make" in block.words:
+            _check_words(block)
+        elif block.language == "bash":
+            self._carry_out(block)
+        elif block.language == "python":
+            self._compute(block)
+        elif block.words[:1] == ("output",):
+            self._compare(block)
+        elif name := block.named("file") or block.named("more"):
+            self._write(block, name)
+        elif block.language == "toml":
+            _parse(block, block.text)
+        elif block.language not in SHOWN:
+            raise block.error(
+                f"nothing runs a block of {block.language!r}; mark it `hardware`, or teach docs/run_blocks.py"
+            )
+
+    def _carry_out(self, block: Block) -> None:
+        here = self.folder.parent / "here"
+        script = f"set -euo pipefail\ntrap 'pwd > {shlex.quote(str(here))}' EXIT\n{block.text}"
+        done = subprocess.run(
+            ["bash", "-c", script],
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+        self.folder, self.printed = Path(here.read_text(encoding="utf-8").strip()), done.stdout
+        if done.returncode != int(block.named("exit") or 0):
+            raise block.error(f"exit code {done.returncode}\n{block.text}\nsaid\n{done.stdout}")
+
+    def _compute(self, block: Block) -> None:
+        said = io.StringIO()
+        with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):
+            try:
+                exec(compile(block.text, f"{block.page} from line {block.line}", "exec"), self.names)  # noqa: S102
+            except Exception as error:
+                raise block.error(f"{traceback.format_exc()}\n{block.text}") from error
+        self.printed = said.getvalue()
+
+    def _compare(self, block: Block) -> None:
+        checker = doctest.OutputChecker()
+        if not checker.check_output(block.text, self.printed, RULES):
+            raise block.error(f"the page shows\n{block.text}\nprinted was\n{self.printed}")
+
+    def _write(self, block: Block, name: str) -> None:
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a" if block.named("more") else "w", encoding="utf-8") as file:
+            file.write(block.text)
+        if path.suffix == ".toml":
+            _parse(block, path.read_text(encoding="utf-8"))
+
+
+def blocks(page: Path, text: str) -> Iterator[Block]:
+    """The fenced blocks of a page in order; directives of MyST are none."""
+    lines = text.splitlines()
+    start: int | None = None
+    for number, line in enumerate(lines):
+        if start is None and re.match(r" *```[^`]*$", line):
+            start = number
+        elif start is not None and re.match(r" *```\s*$", line):
+            indent = len(lines[start]) - len(lines[start].lstrip())
+            language, *words = lines[start].strip().removeprefix("```").split() or [""]
+            code = "".join(f"{one[indent:]}\n" for one in lines[start + 1 : number])
+            if not language.startswith("{"):
+                yield Block(page, start + 2, language, tuple(words), code)
+            start = None
+    if start is not None:
+        raise BlockError(f"{page}:{start + 1}: the block has no end")
+
+
+def _parse(block: Block, text: str) -> None:
+    try:
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise block.error(f"no TOML: {error}") from error
+
+
+# commands that are not run
+
+
+def _check_words(block: Block) -> None:
+    """The commands of a block that is not run."""
+    for command in re.sub(r"\\\n", " ", block.text).splitlines():
+        if why := refused(command.split(" #")[0]):
+            raise block.error(why)
+
+
+def refused(command: str) -> str | None:
+    """Why there is no such command of Recoil or make; None for others and for those that there are."""
+    words = shlex.split(command, comments=True)
+    words = words[next((i for i, word in enumerate(words) if Path(word).name in ("recoil", "make")), len(words)) :]
+    if words[:1] == ["make"]:
+        targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+        return next((f"the Makefile has no target {word!r}" for word in words[1:] if word not in targets), None)
+    return _refused(words[1:]) if words else None
+
+
+def _refused(words: list[str]) -> str | None:
+    found = typer.main.get_command(app)
+    while isinstance(found, TyperGroup) and words and not words[0].startswith("-"):
+        named = found.commands.get(words[0])
+        if named is None:
+            return None if PLACEHOLDER.match(words[0]) else f"there is no command {words[0]!r}"
+        found, words = named, words[1:]
+    options = {name for one in found.params for name in (*one.opts, *one.secondary_opts)} | {"--help"}
+    unknown = (word for word in words if re.match(r"--[a-z]", word) and word.partition("=")[0] not in options)
+    return next((f"`recoil {found.name}` has no option {word}" for word in unknown), None)
+
+
+def check_text(page: Path, text: str) -> None:
+    """`BlockError` for a command in the text of a page that there is not."""
+    for number, line in enumerate(text.splitlines(), 1):
+        for command in INLINE.findall(line):
+            try:
+                why = refused(command)
+            except ValueError:  # a quotation mark of the language, not of the shell
+                why = None
+            if why:
+                raise BlockError(f"{page}:{number}: {why}")
+
+
+# pages
+
+
+def pages() -> list[Path]:
+    """The README and every page under docs, those made from the code as well."""
+    found = (path for path in sorted((ROOT / "docs").rglob("*.md")) if not set(BUILT) & set(path.parts))
+    return [ROOT / "README.md", *found]
+
+
+def run_page(page: Path) -> str | None:
+    """Follow a page from an empty folder; what went wrong, if anything did."""
+    with tempfile.TemporaryDirectory() as folder:
+        scratch = Path(folder) / "scratch"
+        scratch.mkdir()
+        (scratch / ".venv").symlink_to(ROOT / ".venv")  # what a reader has who did what the README says first
+        reader, text, shown = Reader(scratch), page.read_text(encoding="utf-8"), page.relative_to(ROOT)
+        try:
+            check_text(shown, text)
+            for block in blocks(shown, text):
+                reader.follow(block)
+        except BlockError as error:
+            return str(error)
+    return None
+
+
+def _timed(page: Path) -> tuple[Path, float, str | None]:
+    begun_s = time.monotonic()
+    why = run_page(page)
+    return page, time.monotonic() - begun_s, why
+
+
+def _stand_in(folder: Path) -> None:
+    """A `recoil` without its start: the words go to a server that has everything imported (`tests/warm_start.py`)."""
+    os.environ |= {warm_start.FOLDER: str(folder), warm_start.OWNER: str(os.getpid()), "MPLBACKEND": "Agg"}
+    program = folder / "recoil"
+    program.write_text(f'#!/bin/sh\nexec {shlex.join(warm_start.warm())} "$@"\n', encoding="utf-8")
+    program.chmod(0o700)
+    os.environ["PATH"] = f"{folder}:{Path(sys.executable).parent}:{os.environ['PATH']}"
+
+
+def main(named: list[str]) -> int:
+    """Run all pages, or those that are named; 1 if a block failed."""
+    failed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        _stand_in(Path(folder))
+        todo = [Path(name).resolve() for name in named] or pages()
+        with multiprocessing.get_context("fork").Pool(maxtasksperchild=1) as pool:
+            for page, took_s, why in pool.imap_unordered(_timed, todo, chunksize=1):
+                failed += why is not None
+                print(f"{page.relative_to(ROOT)}: {f'{took_s:.1f} s' if why is None else 'FAILED'}", flush=True)
+                if why is not None:
+                    print(why, file=sys.stderr, flush=True)
+    print(f"{len(todo)} pages, {failed} failed")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
