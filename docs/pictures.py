@@ -179,10 +179,8 @@ def ratings(folder: Path, display: str) -> None:
         screen.participant_shows("DescriptionPage")
         screen.keys.type("like a push")
         shoot(screen, "participant-description", (left, top, width, height))
-        screen.keys.press("Return", "Control_L")
-        screen.until(lambda look: look.trial == 2)
-        screen.focus_on("Recoil – P02")
-        screen.at("rating")
+    with AtConsole([*command, "--participant", "P03"], folder, display) as screen:
+        screen.to("rating", trial=1)
         shoot(screen, "rating")
         screen.to("closing")
         shoot(screen, "closing")

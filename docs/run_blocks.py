@@ -5,8 +5,10 @@ The word behind the language of a fence says what is done with the block:
 
 - `bash` is carried out by bash, where `recoil` is this one; it goes on in the folder that the block before left.
 - `python` is carried out in one namespace a page.
-- `toml`, `csv` with `file=NAME` are written to that file (`more=NAME` adds to its end); TOML without a name is parsed.
+- `toml`, `csv` with `file=NAME` are written to that file (`more=NAME` adds to its end, `set=NAME`
+  changes the lines of these keys in their tables, as a reader does in an editor); TOML without a name is parsed.
 - `text output` is compared with what the block before printed; `...` stands for anything.
+- `text message` must stand in the program's own code, but for `...`.
 - `exit=N` is the exit code that the block ends with, 0 unless given.
 - `hardware` marks what needs a gun, a display or a person, `make` what `.ci/run` carries out itself: neither is run,
   but every command in them, and every command in the text, must be one that there is, with the options that it has.
@@ -29,6 +31,7 @@ import tomllib
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import typer
@@ -85,10 +88,14 @@ class Reader:
             self._carry_out(block)
         elif block.language == "python":
             self._compute(block)
+        elif block.words[:1] == ("message",):
+            _look_up(block)
         elif block.words[:1] == ("output",):
             self._compare(block)
         elif name := block.named("file") or block.named("more"):
             self._write(block, name)
+        elif name := block.named("set"):
+            self._edit(block, self.folder / name)
         elif block.language == "toml":
             _parse(block, block.text)
         elif block.language not in SHOWN:
@@ -135,6 +142,27 @@ class Reader:
             _parse(block, path.read_text(encoding="utf-8"))
 
 
+    def _edit(self, block: Block, path: Path) -> None:
+        lines, place = path.read_text(encoding="utf-8").splitlines(), 0
+        for line in block.text.splitlines():
+            if line.startswith("["):
+                place = _found(block, lines, line.split("#")[0].strip(), 0) + 1
+            elif key := line.partition(" = ")[0].strip():
+                lines[_found(block, lines, f"{key} = ", place)] = line
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        _parse(block, path.read_text(encoding="utf-8"))
+
+
+def _found(block: Block, lines: list[str], begins: str, place: int) -> int:
+    """The line that begins so, from a place on and within its table."""
+    for number in range(place, len(lines)):
+        if lines[number].startswith(begins):
+            return number
+        if place and lines[number].startswith("["):
+            break
+    raise block.error(f"the file has no line that begins with {begins!r} there")
+
+
 def blocks(page: Path, text: str) -> Iterator[Block]:
     """The fenced blocks of a page in order; directives of MyST are none."""
     lines = text.splitlines()
@@ -151,6 +179,24 @@ def blocks(page: Path, text: str) -> Iterator[Block]:
             start = None
     if start is not None:
         raise BlockError(f"{page}:{start + 1}: the block has no end")
+
+
+def _look_up(block: Block) -> None:
+    for part in block.text.split("..."):
+        if _plain(part) not in _spoken():
+            raise block.error(f"nothing in the program says {part.strip()!r}")
+
+
+@cache
+def _spoken() -> str:
+    """All code of the program, as if each text stood on one line."""
+    folders = (ROOT / name for name in ("device", "experiments", "analysis", "recoil"))
+    code = "".join(path.read_text(encoding="utf-8") for folder in folders for path in sorted(folder.rglob("*.py")))
+    return _plain(re.sub(r'"\n\s*f?"', "", code))
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.replace("\\", "").split())
 
 
 def _parse(block: Block, text: str) -> None:
