@@ -60,14 +60,11 @@ soak: full
 lock:
 	scripts/lock
 
-# The one result that is committed, remade from nothing, with a picture of its page for the README
+# The one result that is committed, remade from nothing; `make pictures` takes a picture of its page
 reference: setup
-	scripts/system-packages
 	rm -rf results/reference
 	.venv/bin/recoil reproduce --out results/reference
 	rm -rf results/reference/logs results/reference/reproduction.json
-	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1400 \
-	    --screenshot=results/reference/report.png "file://$(CURDIR)/results/reference/report.html"
 
 clean:
 	rm -rf .venv .tools dist .pytest_cache .coverage .mypy_cache .ruff_cache .hypothesis

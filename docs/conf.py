@@ -57,8 +57,8 @@ def _block(visitor: Any, node: Any) -> None:
 
 
 def _as_code(_app: Sphinx, _what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
-    """Docstrings write code in single backticks, as Markdown does."""
-    lines[:] = [re.sub(r"(?<![`:])`([^`]+)`(?!`)", r"``\1``", line) for line in lines]
+    """Docstrings write code in single backticks, as Markdown does, and |d| for an absolute value."""
+    lines[:] = [re.sub(r"(?<![`:])`([^`]+)`(?!`)", r"``\1``", line.replace("|", "\\|")) for line in lines]
 
 
 def setup(app: Sphinx) -> None:

@@ -1,4 +1,4 @@
-"""The reference pages that follow from the code: `python -m docs.generate` writes them to `docs/reference/generated`."""
+"""The reference pages that follow from the code, to `docs/reference/generated`: `python -m docs.generate`."""
 
 from __future__ import annotations
 

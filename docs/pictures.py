@@ -76,11 +76,7 @@ def lab_day(folder: Path, display: str) -> None:
     """The start window, a run of experiment 1 up to an emergency stop, and what there is to see when it is resumed."""
     new_study(folder / "pilot")
     for experiment in ("direction", "preference"):
-        setup = load_setup(str(folder / "pilot" / f"{experiment}.toml"))
-        earlier = RunRequest(
-            setup=setup, participant_id="P01", results=folder / "pilot" / "results", seed=1, screen="terminal"
-        )
-        run(earlier, synthetic_screen, VirtualClock())
+        _run_by_a_person(folder, experiment, "P01")
     day = ["run", "pilot/direction.toml", "--screen", "console", "--results", "pilot/results", "--seed", 25]
     eye = folder / "start.jsonl"
     with AtDisplay(watched_start.words(eye, day), folder, display) as screen:
@@ -89,9 +85,25 @@ def lab_day(folder: Path, display: str) -> None:
     with AtConsole([*day, "--participant", "P02"], folder, display) as screen:
         _first_set(screen)
         _emergency(screen)
-    with AtDisplay([*day, "--participant", "P02"], folder, display) as screen:
-        screen.focus_on("unfinished")
-        shoot(screen, "unfinished")
+    journal = _run_by_a_person(folder, "direction", "P03")
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
+    with AtDisplay([*day, "--participant", "P03"], folder, display) as screen:
+        shoot(screen, "unfinished", screen.focus_on("unfinished"))
+
+
+class LabClock(VirtualClock):
+    """A clock on one day, so that a picture made again has the same date."""
+
+    def utc(self) -> str:
+        """That day."""
+        return "2001-01-01T09:30:00.000000Z"
+
+
+def _run_by_a_person(folder: Path, experiment: str, code: str) -> Path:
+    setup = load_setup(str(folder / "pilot" / f"{experiment}.toml"))
+    results = folder / "pilot" / "results"
+    request = RunRequest(setup=setup, participant_id=code, results=results, seed=1, screen="terminal")
+    return run(request, synthetic_screen, LabClock()).place.journal
 
 
 def _start(screen: AtDisplay, eye: Path) -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import contextlib
 import doctest
 import io
+import json
 import multiprocessing
 import os
 import re
@@ -29,21 +30,21 @@ import tempfile
 import time
 import tomllib
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import typer
+from jsonschema import Draft202012Validator
 from typer.core import TyperGroup
 
+from docs import statistics_schema
 from recoil.cli import app
 from tests import warm_start
 
 ROOT = Path(__file__).parent.parent
 BUILT = ("_build",)
-SHOWN = {"", "text", "r", "json", "csv", "html"}
-"""Languages of blocks that are only looked at."""
 RULES = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 INLINE = re.compile(r"`(recoil [^`]+|make [a-z]+)`")
 PLACEHOLDER = re.compile(r"^\W*$")
@@ -63,10 +64,6 @@ class Block:
     words: tuple[str, ...]
     text: str
 
-    def named(self, key: str) -> str | None:
-        """What a word `key=value` behind the language says."""
-        return next((word.partition("=")[2] for word in self.words if word.startswith(f"{key}=")), None)
-
     def error(self, what: str) -> BlockError:
         """That it went wrong here."""
         return BlockError(f"{self.page}:{self.line}: {what}")
@@ -82,28 +79,36 @@ class Reader:
 
     def follow(self, block: Block) -> None:
         """Do what a block says; `BlockError` if it does not come out."""
-        if "hardware" in block.words or "make" in block.words:
-            _check_words(block)
-        elif block.language == "bash":
-            self._carry_out(block)
-        elif block.language == "python":
-            self._compute(block)
-        elif block.words[:1] == ("message",):
-            _look_up(block)
-        elif block.words[:1] == ("output",):
-            self._compare(block)
-        elif name := block.named("file") or block.named("more"):
-            self._write(block, name)
-        elif name := block.named("set"):
-            self._edit(block, self.folder / name)
-        elif block.language == "toml":
-            _parse(block, block.text)
-        elif block.language not in SHOWN:
-            raise block.error(
-                f"nothing runs a block of {block.language!r}; mark it `hardware`, or teach docs/run_blocks.py"
-            )
+        marks = {word.partition("=")[0]: word.partition("=")[2] for word in block.words}
+        for mark, do in MARKS.items():
+            if mark in marks:
+                do(self, block, marks[mark])
+                return
+        if block.language not in LANGUAGES:
+            raise block.error(f"nothing runs a block of {block.language!r}; mark it, or teach docs/run_blocks.py")
+        LANGUAGES[block.language](self, block, marks.get("exit", "0"))
 
-    def _carry_out(self, block: Block) -> None:
+    def check_words(self, block: Block, _: str) -> None:
+        """The commands of a block that is not run must be ones that there are."""
+        for command in re.sub(r"\\\n", " ", block.text).splitlines():
+            if why := refused(command.split(" #")[0]):
+                raise block.error(why)
+
+    def look_up(self, block: Block, _: str) -> None:
+        """A message must be one that the program has."""
+        for part in block.text.split("..."):
+            if _plain(part) not in _spoken():
+                raise block.error(f"nothing in the program says {part.strip()!r}")
+
+    def parse(self, block: Block, _: str) -> None:
+        """TOML must be TOML."""
+        _parse(block, block.text)
+
+    def pass_by(self, block: Block, _: str) -> None:
+        """What is only looked at."""
+
+    def carry_out(self, block: Block, code: str) -> None:
+        """Have bash do it, as far as its exit code."""
         here = self.folder.parent / "here"
         script = f"set -euo pipefail\ntrap 'pwd > {shlex.quote(str(here))}' EXIT\n{block.text}"
         done = subprocess.run(
@@ -116,10 +121,11 @@ class Reader:
             check=False,
         )
         self.folder, self.printed = Path(here.read_text(encoding="utf-8").strip()), done.stdout
-        if done.returncode != int(block.named("exit") or 0):
+        if done.returncode != int(code):
             raise block.error(f"exit code {done.returncode}\n{block.text}\nsaid\n{done.stdout}")
 
-    def _compute(self, block: Block) -> None:
+    def compute(self, block: Block, _: str) -> None:
+        """Have Python do it."""
         said = io.StringIO()
         with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):
             try:
@@ -128,29 +134,56 @@ class Reader:
                 raise block.error(f"{traceback.format_exc()}\n{block.text}") from error
         self.printed = said.getvalue()
 
-    def _compare(self, block: Block) -> None:
+    def compare(self, block: Block, _: str) -> None:
+        """What is shown must be what was printed."""
         checker = doctest.OutputChecker()
         if not checker.check_output(block.text, self.printed, RULES):
             raise block.error(f"the page shows\n{block.text}\nprinted was\n{self.printed}")
 
-    def _write(self, block: Block, name: str) -> None:
+    def write(self, block: Block, name: str) -> None:
+        """Write a file, as a reader does in an editor."""
+        self._keep(block, self.folder / name, block.text)
+
+    def add(self, block: Block, name: str) -> None:
+        """Add to the end of a file."""
         path = self.folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a" if block.named("more") else "w", encoding="utf-8") as file:
-            file.write(block.text)
-        if path.suffix == ".toml":
-            _parse(block, path.read_text(encoding="utf-8"))
+        self._keep(block, path, path.read_text(encoding="utf-8") + block.text)
 
-
-    def _edit(self, block: Block, path: Path) -> None:
-        lines, place = path.read_text(encoding="utf-8").splitlines(), 0
+    def edit(self, block: Block, name: str) -> None:
+        """Change the lines of keys in their tables."""
+        path, place = self.folder / name, 0
+        lines = path.read_text(encoding="utf-8").splitlines()
         for line in block.text.splitlines():
             if line.startswith("["):
                 place = _found(block, lines, line.split("#")[0].strip(), 0) + 1
             elif key := line.partition(" = ")[0].strip():
                 lines[_found(block, lines, f"{key} = ", place)] = line
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        _parse(block, path.read_text(encoding="utf-8"))
+        self._keep(block, path, "\n".join([*lines, ""]))
+
+    def _keep(self, block: Block, path: Path, text: str) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        if path.suffix == ".toml":
+            _parse(block, text)
+
+
+Doing = Callable[[Reader, Block, str], None]
+MARKS: dict[str, Doing] = {
+    "hardware": Reader.check_words,
+    "make": Reader.check_words,
+    "message": Reader.look_up,
+    "output": Reader.compare,
+    "file": Reader.write,
+    "more": Reader.add,
+    "set": Reader.edit,
+}
+LANGUAGES: dict[str, Doing] = {
+    "bash": Reader.carry_out,
+    "python": Reader.compute,
+    "toml": Reader.parse,
+    "text": Reader.pass_by,
+    "": Reader.pass_by,
+}
 
 
 def _found(block: Block, lines: list[str], begins: str, place: int) -> int:
@@ -181,12 +214,6 @@ def blocks(page: Path, text: str) -> Iterator[Block]:
         raise BlockError(f"{page}:{start + 1}: the block has no end")
 
 
-def _look_up(block: Block) -> None:
-    for part in block.text.split("..."):
-        if _plain(part) not in _spoken():
-            raise block.error(f"nothing in the program says {part.strip()!r}")
-
-
 @cache
 def _spoken() -> str:
     """All code of the program, as if each text stood on one line."""
@@ -207,13 +234,6 @@ def _parse(block: Block, text: str) -> None:
 
 
 # commands that are not run
-
-
-def _check_words(block: Block) -> None:
-    """The commands of a block that is not run."""
-    for command in re.sub(r"\\\n", " ", block.text).splitlines():
-        if why := refused(command.split(" #")[0]):
-            raise block.error(why)
 
 
 def refused(command: str) -> str | None:
@@ -259,6 +279,14 @@ def pages() -> list[Path]:
     return [ROOT / "README.md", *found]
 
 
+def check_statistics(page: Path, folder: Path) -> None:
+    """`BlockError` for a `statistics.json` that was made and is not as its JSON Schema says."""
+    validator = Draft202012Validator(statistics_schema.schema())
+    for path in sorted(folder.rglob("statistics.json")):
+        for error in validator.iter_errors(json.loads(path.read_text(encoding="utf-8"))):
+            raise BlockError(f"{page}: {path.relative_to(folder)}: {error.json_path}: {error.message[:300]}")
+
+
 def run_page(page: Path) -> str | None:
     """Follow a page from an empty folder; what went wrong, if anything did."""
     with tempfile.TemporaryDirectory() as folder:
@@ -270,9 +298,15 @@ def run_page(page: Path) -> str | None:
             check_text(shown, text)
             for block in blocks(shown, text):
                 reader.follow(block)
+            check_statistics(shown, scratch)
         except BlockError as error:
             return str(error)
     return None
+
+
+def _work(page: Path) -> int:
+    """How much there is to do on a page, so that the longest come first."""
+    return len(re.findall("^recoil (?:analyze|power|fit|design|audit)", page.read_text(encoding="utf-8"), re.MULTILINE))
 
 
 def _timed(page: Path) -> tuple[Path, float, str | None]:
@@ -295,7 +329,7 @@ def main(named: list[str]) -> int:
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         _stand_in(Path(folder))
-        todo = [Path(name).resolve() for name in named] or pages()
+        todo = [Path(name).resolve() for name in named] or sorted(pages(), key=_work, reverse=True)
         with multiprocessing.get_context("fork").Pool(maxtasksperchild=1) as pool:
             for page, took_s, why in pool.imap_unordered(_timed, todo, chunksize=1):
                 failed += why is not None
