@@ -29,6 +29,8 @@ suppress_warnings = [
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]
 myst_heading_anchors = 4
 
+smartquotes = False  # `--from` in a help text is no dash
+
 html_theme = "furo"
 html_title = f"Recoil {version}"
 html_math_renderer = "mathml"

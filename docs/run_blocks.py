@@ -9,7 +9,7 @@ The word behind the language of a fence says what is done with the block:
   changes the lines of these keys in their tables, as a reader does in an editor); TOML without a name is parsed.
 - `text output` is compared with what the block before printed; `...` stands for anything.
 - `text message` must stand in the program's own code, but for `...`.
-- `exit=N` is the exit code that the block ends with, 0 unless given.
+- `exit=N` or `exit=N,M` is the exit code that the block may end with, 0 unless given.
 - `hardware` marks what needs a gun, a display or a person, `make` what `.ci/run` carries out itself: neither is run,
   but every command in them, and every command in the text, must be one that there is, with the options that it has.
 """
@@ -121,7 +121,7 @@ class Reader:
             check=False,
         )
         self.folder, self.printed = Path(here.read_text(encoding="utf-8").strip()), done.stdout
-        if done.returncode != int(code):
+        if str(done.returncode) not in code.split(","):
             raise block.error(f"exit code {done.returncode}\n{block.text}\nsaid\n{done.stdout}")
 
     def compute(self, block: Block, _: str) -> None:
