@@ -63,7 +63,30 @@ def _as_code(_app: Sphinx, _what: str, _name: str, _obj: object, _options: objec
     lines[:] = [re.sub(r"(?<![`:])`([^`]+)`(?!`)", r"``\1``", line.replace("|", "\\|")) for line in lines]
 
 
+CAPTIONS = {
+    "file": "the file {}",
+    "more": "at the end of {}",
+    "set": "to change in {}",
+    "hardware": "needs a gun, a display or a person",
+    "output": "it prints",
+}
+"""What stands over a block, by the word behind its language (`docs/run_blocks.py`)."""
+
+
+def _captions(_app: Sphinx, _name: str, source: list[str]) -> None:
+    """Say over each block which file it is, or what it needs."""
+
+    def captioned(fence: re.Match[str]) -> str:
+        indent, language, word, name = fence.groups()
+        caption = CAPTIONS[word].format(name)
+        return f"{indent}```{{code-block}} {language}\n{indent}:caption: {caption}\n\n"
+
+    fences = re.compile(rf"^( *)```(\w+) ({'|'.join(CAPTIONS)})(?:=(\S+))?.*\n", re.MULTILINE)
+    source[0] = fences.sub(captioned, source[0])
+
+
 def setup(app: Sphinx) -> None:
     """Add what Sphinx does not have: MathML, and docstrings with Markdown's backticks."""
     app.add_html_math_renderer("mathml", inline_renderers=(_inline, None), block_renderers=(_block, None))
+    app.connect("source-read", _captions)
     app.connect("autodoc-process-docstring", _as_code)

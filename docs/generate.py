@@ -83,21 +83,48 @@ def _config_page(kind: str, schema: dict[str, Any]) -> str:
     head = f"# {kind}.toml: {KINDS[kind]}\n\n"
     if shipped:
         head += f"“In the shipped file” is `configs/{shipped}`, with the comment that stands there.\n\n"
-    return head + "\n".join(_part(kind, name, part, meanings, notes) for name, part in parts.items()) + _numbers(kind)
+    places = {kind: "Top of the file"}
+    for name, place in dict.fromkeys(_places(schema, schema.get("$defs", {}), "")):
+        places[name] = f"{places[name]}, {place}" if name in places else place
+    return head + "\n".join(_part(name, part, places, meanings, notes) for name, part in parts.items()) + _numbers(kind)
 
 
-def _part(kind: str, name: str, part: dict[str, Any], meanings: Mapping[str, Any], notes: Mapping[str, str]) -> str:
+def _places(part: dict[str, Any], parts: Mapping[str, Any], under: str) -> Iterator[tuple[str, str]]:
+    """Where each table stands in the file, as its head is written there."""
+    for key, schema in part.get("properties", {}).items():
+        for name, place in _heads(schema, f"{under}{key}"):
+            law = next((one["const"] for one in parts[name]["properties"].values() if "const" in one), None)
+            shown = f"[{place}]" if not place.endswith("[]") else f"[[{place[:-2]}]]"
+            yield name, f"`{shown}`" + (f" of `{law}`" if law else "")
+            yield from _places(parts[name], parts, f"{place.removesuffix('[]')}.")
+
+
+def _heads(schema: dict[str, Any], place: str) -> Iterator[tuple[str, str]]:
+    """The tables that a key's value may be, with their places; `[]` ends that of a list."""
+    if "$ref" in schema:
+        yield schema["$ref"].rpartition("/")[2], place
+    for one in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
+        yield from _heads(one, place)
+    for inner in _values(schema):
+        yield from _heads(inner, f"{place}.NAME")
+    if "items" in schema:
+        yield from _heads(schema["items"], f"{place}[]")
+
+
+def _part(
+    name: str, part: dict[str, Any], places: Mapping[str, str], meanings: Mapping[str, Any], notes: Mapping[str, str]
+) -> str:
     keys, said = part.get("properties", {}), meanings.get(name, {})
     if set(keys) != set(said):
         wrong = ", ".join(sorted(set(keys) ^ set(said)))
         raise SystemExit(f"docs/reference/keys.toml: [{name}]: {wrong}: a key without a meaning, or no such key")
-    title = "Top of the file" if name == kind else f"`{name}`"
-    about = "" if name == kind else inspect.cleandoc(part.get("description", "")).replace("\n", " ") + "\n\n"
+    title = places[name]
+    about = "" if "`" not in title else inspect.cleandoc(part.get("description", "")).replace("\n", " ") + "\n\n"
     required = set(part.get("required", ()))
     rows = [
         (
             f"`{key}`",
-            _type(key_schema),
+            _type(key_schema, places),
             _unit(key),
             _default(key_schema, key in required),
             said[key],
@@ -108,21 +135,27 @@ def _part(kind: str, name: str, part: dict[str, Any], meanings: Mapping[str, Any
     return f"## {title}\n\n{about}" + table(("key", "type", "unit", "default", "meaning", "in the shipped file"), rows)
 
 
-def _type(schema: dict[str, Any]) -> str:
+def _type(schema: dict[str, Any], places: Mapping[str, str]) -> str:
     if "anyOf" in schema:
-        return " or ".join(dict.fromkeys(_type(one) for one in schema["anyOf"] if one.get("type") != "null"))
+        return " or ".join(dict.fromkeys(_type(one, places) for one in schema["anyOf"] if one.get("type") != "null"))
     if "oneOf" in schema:
-        return "one of: " + ", ".join(_type(one) for one in schema["oneOf"])
+        return "one of: " + ", ".join(_type(one, places) for one in schema["oneOf"])
     if "$ref" in schema:
-        return f"table `{schema['$ref'].rpartition('/')[2]}`"
+        return f"table {places[schema['$ref'].rpartition('/')[2]]}"
     if "enum" in schema or "const" in schema:
         return ", ".join(f"`{one}`" for one in schema.get("enum", [schema.get("const")]))
     if schema.get("type") == "array":
-        return f"list of {_type(schema['items'])}" if "items" in schema else "list"
+        return f"list of {_type(schema['items'], places)}" if "items" in schema else "list"
     if schema.get("type") == "object":
-        inner = schema.get("additionalProperties")
-        return f"table of {_type(inner)}" if isinstance(inner, dict) and inner else "table"
+        inner = _values(schema)
+        return f"table of {_type(inner[0], places)}" if inner else "table"
     return _bounded(schema)
+
+
+def _values(schema: dict[str, Any]) -> list[dict[str, Any]]:
+    """What the values of a table with free names may be."""
+    found = [schema.get("additionalProperties"), *schema.get("patternProperties", {}).values()]
+    return [one for one in found if isinstance(one, dict) and one]
 
 
 def _bounded(schema: dict[str, Any]) -> str:
