@@ -261,7 +261,7 @@ def runs_of(*logs: Logs) -> Runs:
 
 
 def _all_runs(logs: Logs) -> Iterator[Run]:
-    for experiment, table in {"direction": logs.trials, "preference": logs.ratings}.items():
+    for experiment, table in logs.tables.items():
         yield from _runs(experiment, table, tables.TABLES[experiment], TASKS[experiment])
     for one in logs.designs:
         asked = " ".join(question.text for question in one.design.questions.values())

@@ -12,6 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analysis.logs.files import BadLogError
+from analysis.logs.measures import MEASURES
 from analysis.logs.texts import Cell, Texts
 from experiments.config.lines import name_fault
 from experiments.design.language import NumberScale
@@ -19,8 +20,6 @@ from experiments.record import tables
 from experiments.record.tables import CLOCK_SET_BACK, Column
 from experiments.tasks.questions import on_scale
 
-_MEASURES = {"direction": ("response", "correct"), "preference": ("rating",)}
-"""Columns without which a table has nothing to analyse, though a cell of them may be empty."""
 _INTEGER = re.compile(r"[+-]?[0-9]{1,15}")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 
@@ -39,7 +38,7 @@ def experiment_of(header: Sequence[str]) -> str:
         if header.count(name) > 1:
             raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
     required = [column.name for column in tables.TABLES[experiment] if column.required]
-    for name in (*required, *_MEASURES[experiment]):
+    for name in (*required, *MEASURES[experiment].held):
         if name not in header:
             raise BadLogError(f"column {name!r} is missing (rule: a {experiment} table has it)", 1, name)
     return experiment

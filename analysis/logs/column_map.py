@@ -31,6 +31,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.files import LONGEST_LOG, BadLogError
 from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
+from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model, once
@@ -38,9 +39,6 @@ from experiments.config.lines import LineText
 from experiments.design.language import NumberScale
 from experiments.record import tables
 from experiments.tasks.questions import on_scale
-
-MEASURES = {"direction": ("method", "direction", "response"), "preference": ("method", "rating")}
-"""The columns without which there is nothing to analyse."""
 
 
 class TextFormat(Model):
@@ -155,7 +153,7 @@ class ColumnMap(Model):
 
     @model_validator(mode="after")
     def _measures_are_named(self) -> Self:
-        lacking = [name for name in MEASURES[self.experiment] if getattr(self.columns, name) is None]
+        lacking = [name for name in MEASURES[self.experiment].named if getattr(self.columns, name) is None]
         if lacking:
             raise ValueError(f"columns.{lacking[0]} is missing (rule: a {self.experiment} log has it)")
         if self.columns.response_time is not None and self.response_time is None:

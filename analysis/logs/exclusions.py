@@ -36,6 +36,7 @@ from pydantic import Field, model_validator
 
 from analysis.logs.files import Problem, below, names_below
 from analysis.logs.mapped_people import ShortText
+from analysis.logs.measures import MEASURES
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray
@@ -43,8 +44,6 @@ from analysis.stats.cells import codes_of, places_among
 from analysis.times.own_trials import timed
 from experiments.config.door import Model, Seconds, Share
 from experiments.record.tables import is_rated
-
-_MEASURES = {"direction": ("correct", "trials unanswered"), "preference": ("rating", "ratings missing")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,15 +87,6 @@ def tidied(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**{name: table[name].cat.remove_unused_categories() for name in categories})
 
 
-_DROP = "`drop_unanswered = true` under [trials] in a file for --rules leaves out the trials, not the person"
-_RULES_OF = {
-    "direction": ("every trial is answered", _DROP),
-    "preference": (
-        "every method is rated",
-        "a test of all methods needs every rating; `drop_unanswered = true` under [trials] in a file for --rules keeps "
-        "whoever rated the method another time",
-    ),
-}
 _ABSENT = (
     "everybody has every method",
     "analyse those who have other methods apart: name their folders or files in a call of its own",
@@ -105,19 +95,21 @@ _ABSENT = (
 
 def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, tuple[str, str, str]]:
     """Why participants are left out, by which rule, and what to do, by code."""
-    measure, noun = _MEASURES[experiment]
+    measure = MEASURES[experiment]
     codes = table["participant_id"].cat.categories.tolist()
     person, method = codes_of(table["participant_id"]), places_among(table["method"], methods)
     rows = np.bincount(person, minlength=len(codes))
-    missing = np.bincount(person[table[measure].isna()], minlength=len(codes))
-    lacking = {codes[i]: (f"{missing[i]} of {rows[i]} {noun}", *_RULES_OF[experiment]) for i in np.flatnonzero(missing)}
-    counted = slice(None) if is_rated(experiment) else np.asarray(table["direction"] == "forward")
+    missing = np.bincount(person[table[measure.score].isna()], minlength=len(codes))
+    lacking = {
+        codes[i]: (f"{missing[i]} of {rows[i]} {measure.missing}", measure.rule, measure.remedy)
+        for i in np.flatnonzero(missing)
+    }
+    counted = slice(None) if measure.direction is None else np.asarray(table["direction"] == measure.direction)
     seen = np.zeros((len(codes), len(methods)), dtype=np.bool_)
     seen[person[counted], method[counted]] = True
-    what = "no rating of" if is_rated(experiment) else "no forward trials with"
     absent = {
         codes[i]: (
-            f"{what} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}",
+            f"{measure.absent} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}",
             *_ABSENT,
         )
         for i in np.flatnonzero(~seen.all(axis=1))
@@ -172,7 +164,7 @@ def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
 
 def by_study(logs: Logs) -> dict[str, Logs]:
     """The logs of each study with plain codes, by the study's name; nothing if there is one study only."""
-    names = sorted({str(name) for table in (logs.trials, logs.ratings) for name in table[STUDY].unique()})
+    names = sorted({str(name) for table in logs.tables.values() for name in table[STUDY].unique()})
     if len(names) < 2:
         return {}
     alone = replace(logs, apart=())
@@ -261,8 +253,8 @@ def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:
     excluded: list[LeftOut] = []
     dropped: dict[str, dict[str, dict[str, int]]] = {}
     trials: dict[str, KeptTrials] = {}
-    tables = {"direction": logs.trials, "preference": logs.ratings}
-    for experiment, table in tables.items():
+    tables = logs.tables
+    for experiment, table in logs.tables.items():
         if len(table):
             kept, dropped[experiment] = _without_trials(table, rules.trials, experiment)
             found = [*_reasons(table, kept, rules, experiment)]
@@ -317,7 +309,7 @@ def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Ite
         if rules.response_time_max_s is not None:
             yield "response_time_max_s", own & (time > rules.response_time_max_s)
     if rules.drop_unanswered:
-        yield "drop_unanswered", table[_MEASURES[experiment][0]].isna().to_numpy(dtype=np.bool_)
+        yield "drop_unanswered", table[MEASURES[experiment].score].isna().to_numpy(dtype=np.bool_)
 
 
 BY_HAND = "excluded"
@@ -376,7 +368,7 @@ def _codes(table: pd.DataFrame, listed: ExcludedCode) -> list[str]:
 def _idle(logs: Logs, rules: Rules) -> Iterator[str]:
     """Entries that mean nobody: a code that is mistyped must not go unseen."""
     for listed in rules.excluded:
-        if not any(_codes(table, listed) for table in (logs.trials, logs.ratings)):
+        if not any(_codes(table, listed) for table in logs.tables.values()):
             yield f"the rules exclude {listed.code}, who has no log here"
     for accuracy in rules.accuracy:
         if accuracy.method not in set(logs.trials["method"]):

@@ -15,6 +15,7 @@ import numpy as np
 from analysis.logs.design_logs import DesignLog
 from analysis.logs.files import BadLogError, Problem
 from analysis.logs.journals import BegunRun
+from analysis.logs.measures import MEASURES
 from analysis.logs.texts import Block, Cell, Coded
 from experiments.record.design_table import HANDS, columns
 from experiments.record.tables import DataKind, data_kind, is_simulated
@@ -24,12 +25,11 @@ OF_KIND: dict[DataKind, str] = {
     "simulated gun": "people at a simulated gun",
     "synthetic": "synthetic participants",
 }
-_HANDS_OF = {"direction": "response_source", "preference": "rating_by"}
 
 
 def kinds_of(block: Block) -> Iterator[tuple[int, DataKind | None]]:
     """Each log's number and the kind of its data; None where nobody answered."""
-    hands = _HANDS_OF[block.experiment]
+    hands = MEASURES[block.experiment].hand
     answered = _any_by_log(block, hands, lambda by: by is not None)
     synthetic = _any_by_log(block, hands, lambda by: by == "synthetic")
     simulated = _any_by_log(block, "gun", is_simulated)

@@ -79,6 +79,11 @@ class Logs:
     methods: MethodNames = field(default_factory=MethodNames)
     """The order of methods and what they are called in print."""
 
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The rows by experiment, of the two that have tables of their own."""
+        return {"direction": self.trials, "preference": self.ratings}
+
     def person(self, study: str, code: str) -> str:
         """What a participant is called in the tables; where these hold one study alone, another's has its name."""
         names = set(self.names.values())
@@ -284,7 +289,7 @@ def _of_kind(
     by_design = _by_design(reading, {number: log for number, log in designs.items() if number in mine}, studies)
     used = {number // _LOGS_A_FILE for number in mine}
     files = {number: file for number, file in reading.files.items() if number in used}
-    trials, ratings = (joined(experiment, reading.blocks, studies) for experiment in ("direction", "preference"))
+    trials, ratings = (joined(experiment, reading.blocks, studies) for experiment in tables.TABLES)
     methods = {str(method) for table in (trials, ratings) for method in table["method"].unique()}
     return Logs(
         trials=trials,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 
 from analysis.logs.exclusions import complete_rows
+from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
@@ -19,20 +19,6 @@ from experiments.config.door import ConfigError, read_text
 from experiments.config.findings import line_of
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig, shown_level
-
-
-class _Measure(NamedTuple):
-    """What the report's ANOVA tests of an experiment: a column, of all rows or of one direction's, and its unit."""
-
-    column: str
-    unit: str
-    directions: tuple[str, ...] = ()
-
-
-_MEASURES = {
-    "direction": _Measure("correct", "right answers to forward shots", ("forward",)),
-    "preference": _Measure("rating", "ratings"),
-}
 
 
 def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]:
@@ -51,8 +37,7 @@ def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]
 
 def request_data(logs: Logs, request: AnyRequest) -> RequestData:
     """What a request is about. `ValueError`: no such logs, or no such question."""
-    tables = {"direction": logs.trials, "preference": logs.ratings}
-    there = {name: table for name, table in tables.items() if len(table)}
+    there = {name: table for name, table in logs.tables.items() if len(table)}
     designs = {one.design.design: one for one in logs.designs}
     if request.of in there:
         if request.question is not None:
@@ -65,20 +50,20 @@ def request_data(logs: Logs, request: AnyRequest) -> RequestData:
 
 def _of_experiment(name: str, table: pd.DataFrame, names: MethodNames) -> RequestData:
     """Everybody who is complete."""
-    measure, unit, directions = _MEASURES[name]
+    measure = MEASURES[name]
     methods = methods_in(table, names)
     rows = complete_rows(coded(table), name, methods)[0]
-    if directions:
-        rows = rows[rows["direction"].isin(directions)]
+    if measure.direction is not None:
+        rows = rows[rows["direction"] == measure.direction]
     trials = pd.DataFrame(
         {
             "participant_id": rows["participant_id"].astype(str),
             "method": rows["method"].astype(str),
-            "score": rows[measure].astype("float64"),
+            "score": rows[measure.score].astype("float64"),
         }
     )
     scores = trials.pivot_table(index="participant_id", columns="method", values="score").reindex(columns=methods)
-    return RequestData(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=unit)
+    return RequestData(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=measure.unit)
 
 
 def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> RequestData:

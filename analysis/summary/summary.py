@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.logs.exclusions import LeftOut, complete_rows
+from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.report.serial import undefined
@@ -54,8 +55,6 @@ from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
 from experiments.record.design_table import ANTICIPATION_S
 
-SCALES = {"direction": (0.0, 1.0), "preference": (0.0, 10.0)}
-"""The least and the most that a score can be."""
 METHOD_ORDER = ("vibration", "asymmetric-1", "asymmetric-2")
 TUKEY_ERROR_TERM = (
     "Tukey's HSD with the pooled error term of the repeated-measures ANOVA (MS_error of participant × method), "
@@ -171,7 +170,7 @@ def _version(name: str) -> str:
 
 def _warnings(found: results.StudyStatistics) -> Iterator[str]:
     """Why there is no test, the violated assumptions that change which number to read, and what is written as null."""
-    for experiment in SCALES:
+    for experiment in MEASURES:
         one = found.of(experiment)
         if one is not None and one.anova is None:
             there = f"complete participants: {one.n}, methods: {len(one.methods)}"
@@ -247,11 +246,11 @@ def _within(scores: pd.DataFrame, experiment: str, origin: results.Origin) -> re
         means=shown.means,
         sds=shown.sds,
         participants=shown.participants,
-        within_ci=_within_ci(scores, SCALES[experiment]) if tested else None,
+        within_ci=_within_ci(scores, MEASURES[experiment].scale) if tested else None,
         anova=_anova(scores.to_numpy()) if tested else None,
         tukey=_tukey(scores) if tested else None,
         tukey_error_term=TUKEY_ERROR_TERM,
-        supplement=within_supplement(scores, SCALES[experiment]),
+        supplement=within_supplement(scores, MEASURES[experiment].scale),
         origin=origin,
     )
 

@@ -21,7 +21,7 @@ from analysis.summary.designs import answer_scores, varied
 from analysis.summary.results import WithinStatistics
 from analysis.times.own_trials import timed
 from experiments.design.language import QuestionConfig
-from experiments.record.tables import guard
+from experiments.record.tables import guard, is_rated
 from experiments.tasks.questions import correct_columns
 
 MAX_NAME = 64
@@ -31,13 +31,12 @@ _KEYS = [STUDY, "participant_id", "method"]
 def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[str, bytes]:
     """File names and contents: `direction_long.csv`, `direction_wide.csv`, `preference_long.csv`, ..."""
     files: dict[str, bytes] = {}
-    tables = {"direction": (logs.trials, _direction), "preference": (logs.ratings, _preference)}
-    for experiment, (table, measure) in tables.items():
+    for experiment, table in logs.tables.items():
         whose = analysed.get(experiment)
         if whose is not None:
             keys = table[_KEYS].astype(str)
             mine = keys["participant_id"].isin(whose.participants.codes)
-            long = measure(pd.concat([keys, table.drop(columns=_KEYS)], axis=1)[mine])
+            long = _scores(experiment, pd.concat([keys, table.drop(columns=_KEYS)], axis=1)[mine])
             files[f"{experiment}_long.csv"] = _csv(long)
             files[f"{experiment}_wide.csv"] = _csv(_wide(long, whose.methods))
     return files | {f"{one.design.design}_long.csv": _csv(_of_design(one)) for one in logs.designs}
@@ -79,7 +78,12 @@ def _measures(
     return found
 
 
-def _direction(trials: pd.DataFrame) -> pd.DataFrame:
+def _scores(experiment: str, rows: pd.DataFrame) -> pd.DataFrame:
+    """What each participant answered with each method."""
+    return _ratings(rows) if is_rated(experiment) else _answers(rows)
+
+
+def _answers(trials: pd.DataFrame) -> pd.DataFrame:
     """Trials, correct answers and rates by direction, and the median of the participant's own response times."""
     own_s = trials["response_time_s"].where(timed(trials).own)
     keyed = trials.assign(correct=trials["correct"].astype("float64"), own_time_s=own_s)
@@ -96,7 +100,7 @@ def _direction(trials: pd.DataFrame) -> pd.DataFrame:
     return counts.reset_index()
 
 
-def _preference(ratings: pd.DataFrame) -> pd.DataFrame:
+def _ratings(ratings: pd.DataFrame) -> pd.DataFrame:
     """Rating and order of presentation."""
     rows = ratings.groupby(_KEYS).agg(rating=("rating", "mean"), order=("trial", "min"))
     return rows.reset_index()
