@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan
 from experiments.record import design_table, replay
-from experiments.record.journal import Contents, Head, JournalError, read_journal
+from experiments.record.journal import ENDING, Contents, Head, JournalError, read_journal
 from experiments.record.tables import table_bytes
+
+JOURNAL_NAME = re.compile(r"sub-([A-Za-z0-9]{1,32})_task-([a-z]+)(_practice)?_journal(\.aside-[0-9]+)?\.jsonl$")
+"""The name of a run's journal: code, experiment, whether it is a practice's, whether it was set aside."""
 
 
 def began_with(head: Head) -> DesignConfig:
@@ -30,8 +35,23 @@ def table(contents: Contents) -> bytes:
     return table_bytes(design_table.columns(design), rows)
 
 
+def misnamed(path: Path, plan: Plan) -> str:
+    """Whose a journal is that lies under another run's name; empty if it is where it belongs, or says no name."""
+    name = JOURNAL_NAME.search(path.name)
+    if name is None or (name[1], name[2]) == (plan.participant_id, plan.experiment):
+        return ""
+    rule = "(rule: a journal lies under the code and experiment of its run)"
+    back = f"sub-{plan.participant_id}/sub-{plan.participant_id}_task-{plan.experiment}{ENDING}"
+    return f"is of participant {plan.participant_id}, experiment {plan.experiment}; was it renamed? {rule}: {back}"
+
+
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
-    """The table of a journal: where it belongs, its bytes, and what the journal holds."""
+    """The table of a journal: where it belongs, its bytes, and what the journal holds.
+
+    `JournalError` as `began_with`, and if it lies under another run's name: whose table would it be?
+    """
     contents = read_journal(path)
+    if said := misnamed(path, contents.plan):
+        raise JournalError(f"{path}: {said}")
     name = path.name.replace("_journal", f"_{began_with(contents.head).table}")
     return path.with_name(name).with_suffix(".csv"), table(contents), contents

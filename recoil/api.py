@@ -148,7 +148,7 @@ def analyze(
     if asked is not None and requests is not None:
         found = replace(found, requested=answers_to(asked, Path(requests), replace(logs, apart=())))
     left_out = (f"left out: {one}" for one in (*logs.problems, *logs.begun))
-    said = few_of_each([*left_out, *map(str, logs.remarks), *found.warnings])
+    said = few_of_each([*left_out, *map(str, (*logs.remarks, *logs.notes)), *found.warnings])
     return replace(found, warnings=tuple(said))
 
 

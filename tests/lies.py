@@ -62,7 +62,7 @@ def journal(folder: Path, experiment: str, code: str = "P01") -> Path:
 
 def said_of(logs: Logs) -> str:
     """What there is to say of logs before any statistic."""
-    return "\n".join(map(str, (*logs.problems, *logs.remarks, *logs.begun, *left_out_by_files(logs))))
+    return "\n".join(map(str, (*logs.problems, *logs.remarks, *logs.notes, *logs.begun, *left_out_by_files(logs))))
 
 
 def said_in_analysis(logs: Logs) -> str:
@@ -215,6 +215,26 @@ def renamed(folder: Path) -> None:
     path = journal(folder, "direction", "P07")
     path.parent.mkdir()
     journal(folder, "direction").rename(path)
+
+
+def copied_journal(folder: Path) -> None:
+    shutil.copy(journal(folder, "direction", "P02"), journal(folder, "direction"))
+
+
+def rebuilt(change: Callable[[Path], object]) -> Callable[[Path], str]:
+    """What `recoil rebuild` says after a change in a folder, whose table it leaves as it was."""
+
+    def tell(folder: Path) -> str:
+        change(folder)
+        before = table(folder, "direction").read_bytes()
+        try:
+            rebuild_table(journal(folder, "direction"))
+        except RecoilError as error:
+            assert table(folder, "direction").read_bytes() == before
+            return str(error)
+        return "it was rebuilt"
+
+    return tell
 
 
 def unfinished_and_edited(folder: Path) -> None:
@@ -503,6 +523,21 @@ _JOURNALS: tuple[_Told, ...] = (
         "the journal gone while others have one",
         in_folder(lambda folder: journal(folder, "direction").unlink()),
         "logs have no journal beside them, as the others have, so nothing proves them: P01",
+    ),
+    (
+        "all journals gone while the tables stand",
+        in_folder(lambda folder: [one.unlink() for one in folder.rglob("*_journal.jsonl")]),
+        "none of the 4 logs has a journal beside it, which every run writes, so nothing proves what is there",
+    ),
+    (
+        "a journal copied over another's",
+        in_folder(copied_journal),
+        "is of participant P02, experiment direction; was it",
+    ),
+    (
+        "a journal copied over another's, to be rebuilt",
+        rebuilt(copied_journal),
+        "(rule: a journal lies under the code and experiment of its run): sub-P02/sub-P02_task-direction_journal.jsonl",
     ),
     (
         "the table of a finished run gone",

@@ -39,7 +39,7 @@ def test_a_study_with_a_method_fewer_is_checked_reproduced_and_analysed(tmp_path
     page = (folder / "simulated" / "report.md").read_text(encoding="utf-8")
     assert "No odds of the published pattern of direction: the study has no asymmetric-1" in page
     request = Request(paths=[folder / "simulated" / "logs"], out=folder / "analysis")
-    statistics, problems = analyze(request)
+    statistics, problems, _ = analyze(request)
     assert not problems
     assert statistics.preference is not None
     assert [(pair.a, pair.b) for pair in statistics.preference.tukey or ()] == [("asymmetric-2", "vibration")]
@@ -54,7 +54,7 @@ def test_a_design_with_a_level_of_0_volts_is_checked_reproduced_and_analysed(tmp
     done = reproduce(prepared(str(folder / "study.toml"), 1), folder / "simulated", lambda _: None)
     cells = done.statistics.designs["voltages"].questions["response"].cells
     assert [cell.levels["voltage_V"] for cell in cells[:3]] == [0.0, 0.0, 7.0]
-    statistics, problems = analyze(Request(paths=[folder / "simulated" / "logs"], out=folder / "analysis"))
+    statistics, problems, _ = analyze(Request(paths=[folder / "simulated" / "logs"], out=folder / "analysis"))
     assert not problems
     found = json.loads((folder / "analysis" / "statistics.json").read_text(encoding="utf-8"))
     assert found["voltages"]["n"] == statistics.designs["voltages"].n == 2

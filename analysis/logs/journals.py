@@ -6,12 +6,13 @@ import hashlib
 import os
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from analysis.logs.files import BadLogError, Problem
-from experiments.rebuild import table
+from experiments.rebuild import JOURNAL_NAME, misnamed, table
 from experiments.record import journal, replay
 from experiments.record.journal import Contents, JournalError
 from experiments.record.tables import FILE_SUFFIX, DataKind
@@ -19,7 +20,6 @@ from experiments.session.history import answered
 from experiments.study.folders import data_of
 
 RunKind = Literal["run", "practice", "set aside"]
-_NAME = re.compile(r"sub-([A-Za-z0-9]{1,32})_task-([a-z]+)(_practice)?_journal(\.aside-[0-9]+)?\.jsonl$")
 _TABLE = re.compile(rf"(_({'|'.join({*FILE_SUFFIX.values()})}))?\.[^.]*$")
 
 
@@ -62,7 +62,7 @@ class BegunRun:
 
 def run_file(path: str, study: str) -> RunFile | None:
     """The run whose journal has this name; `None` if it is that of no journal."""
-    found = _NAME.search(path)
+    found = JOURNAL_NAME.search(path)
     if found is None:
         return None
     kind: RunKind = "practice" if found[3] else "set aside" if found[4] else "run"
@@ -96,9 +96,8 @@ def made_again(run: RunFile) -> bytes | BegunRun:
 
 
 def _refuse_other(run: RunFile, contents: Contents) -> None:
-    plan = contents.plan
-    if (plan.participant_id, plan.experiment) != (run.participant, run.experiment):
-        raise JournalError(f"is of participant {plan.participant_id}, experiment {plan.experiment}; was it renamed?")
+    if said := misnamed(Path(run.path), contents.plan):
+        raise JournalError(said)
 
 
 def compared(path: str, content: bytes) -> str | None:
@@ -122,8 +121,17 @@ def compared_with(data: bytes, path: str, content: bytes) -> str:
         return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"
     of_table, of_itself = journal.ending_of(data)
     if of_table and of_table != hashlib.sha256(content).hexdigest():
-        raise BadLogError(f"edited since the run; `recoil rebuild {where}` gives the original")
+        raise _edited(where, data, f"edited since the run; `recoil rebuild {where}` gives the original")
     return "" if of_itself else _compared_whole(where, content, data, finished=bool(of_table))
+
+
+def _edited(where: str, data: bytes, otherwise: str) -> BadLogError:
+    """What is said of a table that its journal does not make: whose the journal is, if it is another run's."""
+    with suppress(JournalError):  # what is wrong with the head is no news beside a table that differs
+        head = journal.head_of(Path(where), data)
+        if head is not None and (said := misnamed(Path(where), head.plan)):
+            return BadLogError(f"the journal beside it, {Path(where).name}, {said}; nothing proves this table")
+    return BadLogError(otherwise)
 
 
 def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) -> str:
@@ -137,9 +145,8 @@ def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) 
         known = "the table is still the one of the finished run" if finished else "so nothing proves the table"
         return f"its journal cannot be trusted, {known}: {_without(where, error)}"
     if made != content:
-        raise BadLogError(
-            f"is not what its journal says: edited, or the run went on since; `recoil rebuild {where}` makes it anew"
-        )
+        how = f"edited, or the run went on since; `recoil rebuild {where}` makes it anew"
+        raise _edited(where, data, f"is not what its journal says: {how}")
     if finished:
         return "its journal was changed and says the same as before"
     return "its run is not finished; the table holds what was answered so far, and `recoil run ... --resume` goes on"
@@ -151,17 +158,31 @@ def _without(path: str, error: JournalError) -> str:
 
 def gone(logs: Iterable[tuple[str, str, bool]]) -> list[Problem]:
     """Of each study's folder where some logs have a journal, those that have none. `logs`: folder, code, has one."""
+    return [_lacking(study, there) for study, there in _by_study(logs).items() if there[True] and there[False]]
+
+
+def all_gone(logs: Iterable[tuple[str, str, bool]]) -> list[Problem]:
+    """The studies' folders in which no log has a journal; whoever was sent tables alone has done nothing wrong."""
+    return [_lacking(study, there) for study, there in _by_study(logs).items() if not there[True]]
+
+
+def _by_study(logs: Iterable[tuple[str, str, bool]]) -> dict[str, dict[bool, list[str]]]:
+    """By folder the codes of the logs with a journal, and without."""
     by_study: dict[str, dict[bool, list[str]]] = {}
     for study, code, proven in logs:
         by_study.setdefault(study, {True: [], False: []})[proven].append(code)
-    return [
-        Problem(file=Path(study), line=None, column=None, message=_gone(there[False], sum(map(len, there.values()))))
-        for study, there in by_study.items()
-        if there[True] and there[False]
-    ]
+    return by_study
+
+
+def _lacking(study: str, there: dict[bool, list[str]]) -> Problem:
+    message = _gone(there[False], sum(map(len, there.values())))
+    return Problem(file=Path(study), line=None, column=None, message=message)
 
 
 def _gone(codes: list[str], count: int) -> str:
+    if len(codes) == count:
+        has = "the log has no journal" if count == 1 else f"none of the {count} logs has a journal"
+        return f"{has} beside it, which every run writes, so nothing proves what is there; put the journals back"
     shown = ", ".join(codes[:20]) + (f" and {len(codes) - 20} more" if len(codes) > 20 else "")
     return (
         f"{len(codes)} of {count} logs have no journal beside them, as the others have, so nothing proves them: "

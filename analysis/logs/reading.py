@@ -30,7 +30,7 @@ from analysis.logs.files import (
     read_content,
     study_names,
 )
-from analysis.logs.journals import BegunRun, RunFile, compared, gone, made_again, run_file, without_table
+from analysis.logs.journals import BegunRun, RunFile, all_gone, compared, gone, made_again, run_file, without_table
 from analysis.logs.kinds import IN_REGISTER, begun_by_kind, kept_out, kind_of_design, kinds_of, kinds_there
 from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
@@ -69,6 +69,8 @@ class Logs:
     files: tuple[Path, ...]
     designs: tuple[DesignLogs, ...] = ()
     remarks: tuple[Problem, ...] = ()
+    notes: tuple[Problem, ...] = ()
+    """What is good to know of logs that are as they should be."""
     begun: tuple[BegunRun, ...] = ()
     runs: tuple[RunFile, ...] = ()
     """Every run whose journal was found, practices and those set aside too."""
@@ -270,6 +272,7 @@ def read_logs(
         first,
         problems=tuple(sorted(reading.problems, key=_by_place)),
         remarks=tuple(reading.remarks),
+        notes=tuple(all_gone(reading.proven)),
         begun=tuple(begun_of[kinds[0]]),
         runs=tuple(runs_of[kinds[0]]),
         joined=tuple(

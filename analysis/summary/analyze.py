@@ -91,10 +91,10 @@ class _Analysed:
 
 def analyze(
     request: Request, track: Track = iter, progress: Progress = unseen
-) -> tuple[StudyStatistics, tuple[str, ...]]:
-    """Write statistics, tables and report of all usable logs; returns the statistics and what there is to say.
+) -> tuple[StudyStatistics, tuple[str, ...], tuple[str, ...]]:
+    """Write statistics, tables and report of all usable logs; returns the statistics, exceptions and notes.
 
-    That is whose logs were left out, and what was used though something is to be said of it.
+    Exceptions: whose logs were left out, and what was used though something is to be said of it.
 
     `PlaceError` if there is no usable log at all, with every reason.
     """
@@ -107,7 +107,7 @@ def analyze(
     for path, content in _tables(parts).items():
         storage.make_folder((request.out / path).parent)
         storage.write_whole(request.out / path, content)
-    return report.statistics, (*edited, *_said(logs, report.statistics))
+    return report.statistics, (*edited, *_said(logs, report.statistics)), tuple(map(str, logs.notes))
 
 
 def result_files(request: Request, track: Track = iter) -> dict[str, bytes]:
@@ -150,7 +150,7 @@ def _analysis(
         title=request.title or report_title(logs),
         statistics=statistics,
         problems=logs.problems,
-        remarks=logs.remarks,
+        remarks=(*logs.remarks, *logs.notes),
         comparison=compared,
         beside=tuple(main.tables),
         provenance=provenance() | _read_by(request.columns, files.mapping),

@@ -82,8 +82,8 @@ def analyze(
         fits=fits,
         include_synthetic=include_synthetic,
     )
-    statistics, said = feature.analyze(asked, tracked, progress)
-    for line in few_of_each(said):
+    statistics, said, notes = feature.analyze(asked, tracked, progress)
+    for line in few_of_each((*said, *notes)):
         say(f"recoil: {line}")
     show(statistics, f"Report: {out / 'report.html'}", as_json)
     raise end(exceptions=bool(said))
