@@ -258,6 +258,7 @@ onset_utc = "when"
 [response_time]
 unit = "s"
 """
+PATTERN_MAP = MAP.replace('column = "who"', 'column = "who"\npattern = "(A[0-9])"')
 RATING_MAP = """
 experiment = "preference"
 [participant]
@@ -299,6 +300,12 @@ def mapped(
             return str(error)
 
     return tell
+
+
+def said_of_people(logs: Logs) -> str:
+    """What is said where both people of a file are read all the same."""
+    assert sorted(logs.trials["participant_id"].unique()) == ["A1", "A2"]
+    return said_of(logs)
 
 
 def nothing(_: object) -> None:
@@ -671,6 +678,26 @@ _MAPS: tuple[_Told, ...] = (
         "seconds for milliseconds",
         mapped(nothing, text=MAP.replace('unit = "s"', 'unit = "ms"'), say=said_in_analysis),
         "anticipations, answers",
+    ),
+    (
+        "a participant's code that is empty",
+        mapped(lambda rows: rows[3].update(who=""), say=said_of_people),
+        "line 5, column who: the participant's code is empty (rule: every row says whose it is); this row is left out",
+    ),
+    (
+        "a participant's code that does not fit",
+        mapped(lambda rows: rows[3].update(who="?"), text=PATTERN_MAP, say=said_of_people),
+        "[values.participant] names who does not fit); this row is left out, and the others used",
+    ),
+    (
+        "answers that are the directions",
+        mapped(nothing, text=MAP.replace('"said"', '"way"')),
+        "columns.response and columns.direction are both the column 'way' (rule: what a participant did stands in a",
+    ),
+    (
+        "a verdict that is the answer",
+        mapped(nothing, text=MAP.replace('"ok"', '"said"')),
+        "columns.response and columns.correct are both the column 'said'",
     ),
     ("no unit", mapped(nothing, text=MAP.replace('[response_time]\nunit = "s"', "")), "response_time.unit is missing"),
     ("an unknown key", mapped(nothing, text=MAP + "tempo = 3\n"), "unknown key"),

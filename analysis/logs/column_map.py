@@ -161,12 +161,25 @@ class ColumnMap(Model):
         return self
 
     @model_validator(mode="after")
+    def _answers_stand_by_themselves(self) -> Self:
+        roles = {f"columns.{role}": name for role, name in self.columns.model_dump(exclude_none=True).items()}
+        roles |= {"participant.column": self.participant.column} if self.participant.column else {}
+        for answer in (f"columns.{name}" for name in _ANSWERS):
+            for role, name in roles.items():
+                if role != answer and name == roles.get(answer):
+                    rule = "(rule: what a participant did stands in a column of its own)"
+                    raise ValueError(f"{answer} and {role} are both the column {name!r} {rule}")
+        return self
+
+    @model_validator(mode="after")
     def _decimal_mark_does_not_part_cells(self) -> Self:
         if self.text.decimal == self.text.delimiter:
             raise ValueError(f"text.decimal = {self.text.decimal!r} is also text.delimiter (rule: they differ)")
         return self
 
 
+_ANSWERS = ("response", "rating", "response_time", "correct")
+"""What a participant did, or another program said of it: no such column can say anything else."""
 _Row = dict[str, str]
 
 
@@ -191,12 +204,18 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
     every = list(_lines(content, mapping))
     lines = [line for line in every if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)]
     people: dict[tuple[str | None, str], list[_Line]] = {}
+    nobodys: list[BadLogError] = []
     for line in lines:
         study = line.cells[mapping.columns.study] if mapping.columns.study else None
-        people.setdefault((study, _code(line, file_name, mapping)), []).append(line)
-    if not people:
+        try:
+            people.setdefault((study, _code(line, file_name, mapping)), []).append(line)
+        except BadLogError as bad:
+            nobodys.append(bad)
+    if not lines:
         raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
-    return [
+    if not people:
+        raise nobodys[0]
+    found = [
         MappedLog(
             study=study,
             participant=code,
@@ -205,6 +224,24 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
         )
         for (study, code), group in people.items()
     ]
+    return [*found, _nobodys(nobodys, mapping)] if nobodys else found
+
+
+def _nobodys(faults: Sequence[BadLogError], mapping: ColumnMap) -> MappedLog:
+    """The rows that nobody's code is on: they are left out, and the rows of others are used."""
+    count, first = len(faults), faults[0]
+    rows = "this row is left out" if count == 1 else f"{count} such rows are left out, on lines {_some(faults)}"
+    bad = BadLogError(f"{first.message}; {rows}, and the others used", first.line, first.column)
+    return MappedLog(study=None, participant="", experiment=mapping.experiment, records=bad)
+
+
+def _some(faults: Sequence[BadLogError]) -> str:
+    more = f" and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
+    return ", ".join(str(one.line) for one in faults[:_SHOWN]) + more
+
+
+_SHOWN = 5
+"""So many lines are named in a message."""
 
 
 def _code(line: _Line, file_name: str, mapping: ColumnMap) -> str:

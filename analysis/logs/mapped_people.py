@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from analysis.logs.files import BadLogError
 from analysis.logs.patterns import Pattern, group_in, groups_in
 from experiments.config.door import Model
+from experiments.record import tables
 from experiments.study.folders import is_code
 
 ShortText = Annotated[str, Field(min_length=1, max_length=500)]
@@ -51,6 +52,8 @@ def code_in(text: str, where: ParticipantMapping, known: Mapping[str, str], line
             rule = f"(rule: participant.file_name = {where.file_name!r} finds it)"
             raise BadLogError(f"the name has no participant's code {rule}")
         return known.get(code, code)
+    if text == tables.MISSING and text not in known:
+        raise BadLogError("the participant's code is empty (rule: every row says whose it is)", line, where.column)
     code = text if where.pattern is None or text in known else _group(where.pattern, text)
     if code is None:
         rule = f"(rule: participant.pattern = {where.pattern!r} finds it; [values.participant] names who does not fit)"
