@@ -308,6 +308,14 @@ def said_of_people(logs: Logs) -> str:
     return said_of(logs)
 
 
+def said_of_strays(logs: Logs) -> str:
+    """What is said of whoever is left out, where A1 is not."""
+    found = summarize(logs, trade=False)
+    assert found.direction is not None
+    assert tuple(found.direction.participants.codes) == ("A1",)
+    return "\n".join(f"{one.participant}: {one.reason} (rule: {one.rule}); {one.remedy}" for one in found.excluded)
+
+
 def nothing(_: object) -> None:
     """The file is as it should be: the map lies."""
 
@@ -678,6 +686,11 @@ _MAPS: tuple[_Told, ...] = (
         "seconds for milliseconds",
         mapped(nothing, text=MAP.replace('unit = "s"', 'unit = "ms"'), say=said_in_analysis),
         "anticipations, answers",
+    ),
+    (
+        "a method misspelt in one row",
+        mapped(lambda rows: rows[20].update(how="sofd"), say=said_of_strays),
+        "A2: trials with 'sofd' (1), which 1 of 2 people has (rule: a method is one that half of the people have)",
     ),
     (
         "a participant's code that is empty",

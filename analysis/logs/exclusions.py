@@ -64,10 +64,11 @@ class LeftOut:
 def complete_rows(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> tuple[pd.DataFrame, list[LeftOut]]:
     """The rows of the participants who answered everything, and the others.
 
-    Every method must be there; in direction with forward trials, the only ones that its measure uses. `table` is
-    coded.
+    Every one of the methods must be there, and no other; in direction with forward trials, the only ones that its
+    measure uses. `table` is coded.
     """
-    reasons = _incomplete(table, experiment, methods)
+    reasons = _strayed(table, experiment, methods)
+    reasons |= _incomplete(rows_without(table, reasons) if reasons else table, experiment, methods)
     left_out = [
         LeftOut(experiment=experiment, participant=code, reason=reason, rule=rule, remedy=remedy)
         for code, (reason, rule, remedy) in sorted(reasons.items())
@@ -87,10 +88,43 @@ def tidied(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**{name: table[name].cat.remove_unused_categories() for name in categories})
 
 
+_STRAY = (
+    "a method is one that half of the people have",
+    "if it is misspelt, correct it, or let [values.method] in the map say what it means; else analyse those who have "
+    "other methods apart: name their folders or files in a call of its own",
+)
 _ABSENT = (
     "everybody has every method",
     "analyse those who have other methods apart: name their folders or files in a call of its own",
 )
+
+
+def shared_methods(table: pd.DataFrame) -> set[str]:
+    """The methods that a test compares: each is one of half of the people at least.
+
+    What half of them have and half have not is none if it has fewer than half of a method's usual rows: a slip. Where
+    no two share one, it is every method.
+    """
+    rows = table.groupby(["method", "participant_id"], observed=True).size()
+    by_method = rows.groupby(level="method", observed=True)
+    have, people = by_method.size(), table["participant_id"].nunique()
+    slips = (2 * have == people) & (2 * by_method.median() < rows.median())
+    shared = {str(method) for method in have.index[(2 * have >= people) & ~slips]}
+    return shared or set(map(str, have.index))
+
+
+def _strayed(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, tuple[str, str, str]]:
+    """Who has a method that is none of these, by which rule, and what to do, by code."""
+    stray = table[~table["method"].isin(list(methods))]
+    rows = stray.groupby(["participant_id", "method"], observed=True).size()
+    have, people = stray.groupby("method", observed=True)["participant_id"].nunique(), table["participant_id"].nunique()
+    noun = "ratings of" if is_rated(experiment) else "trials with"
+    said: dict[str, list[str]] = {}
+    for (code, method), count in rows.items():
+        verb = "has" if have[method] == 1 else "have"
+        who = f"{have[method]} of {people} people {verb}"
+        said.setdefault(str(code), []).append(f"{noun} {method!r} ({count}), which {who}")
+    return {code: ("; ".join(some), *_STRAY) for code, some in said.items()}
 
 
 def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, tuple[str, str, str]]:

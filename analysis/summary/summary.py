@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import pandas as pd
 
-from analysis.logs.exclusions import LeftOut, complete_rows
+from analysis.logs.exclusions import LeftOut, complete_rows, shared_methods
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
@@ -150,9 +150,8 @@ def statistics_versions() -> dict[str, str]:
 
 
 def methods_in(table: pd.DataFrame, names: MethodNames) -> list[str]:
-    """The methods of a table in the order that is known of them, then the paper's, then as people count."""
-    found = {str(method) for method in table["method"].unique()}
-    return names.and_then(MethodNames(order=METHOD_ORDER)).ordered(found)
+    """The methods that people share in the order that is known of them, then the paper's, then as people count."""
+    return names.and_then(MethodNames(order=METHOD_ORDER)).ordered(shared_methods(table))
 
 
 def _labels(found: Sequence[results.WithinStatistics | None], names: MethodNames) -> dict[str, str] | None:
