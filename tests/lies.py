@@ -316,6 +316,11 @@ def said_of_strays(logs: Logs) -> str:
     return "\n".join(f"{one.participant}: {one.reason} (rule: {one.rule}); {one.remedy}" for one in found.excluded)
 
 
+def dated(hour: str) -> Callable[[Rows], object]:
+    """Onsets within an hour, 12 s after each full minute."""
+    return lambda rows: [row.update(when=f"{hour}:{n:02d}:12Z") for n, row in enumerate(rows)]
+
+
 def nothing(_: object) -> None:
     """The file is as it should be: the map lies."""
 
@@ -653,6 +658,23 @@ _MAPS: tuple[_Told, ...] = (
         mapped(lambda rows: rows[0].update(mark="8"), text=RATING_MAP),
         "rating 8 is out of range",
     ),
+    (
+        "milliseconds said to be seconds",
+        mapped(lambda rows: [row.update(rt=str(350 + 7 * n)) for n, row in enumerate(rows)]),
+        "response times is 402.5 s (rule: at most 60 s; are they ms? A map says so by response_time.unit)",
+    ),
+    (
+        "a time beyond the next onset",
+        mapped(lambda rows: (dated("2026-11-21T09")(rows), rows[3].update(rt="64"))),
+        "a response time is 64 s after 2026-11-21T09:03:12Z, and the next onset 60 s after it (rule: an answer comes",
+    ),
+    (
+        "onsets alike",
+        mapped(lambda rows: [row.update(when="2026-11-21") for row in rows]),
+        "all 16 onsets are 2026-11-21T00:00:00Z (rule: onsets that were measured differ",
+    ),
+    ("onsets of 1970", mapped(dated("1970-01-01T00")), "an onset is 1970-01-01T00:00:12Z (rule: from 2000 on"),
+    ("onsets to come", mapped(dated("2226-11-21T09")), "an onset is 2226-11-21T09:00:12Z (rule: from 2000 on"),
     ("a time below 0", mapped(lambda rows: rows[0].update(rt="-0.2")), "participant A1 of "),
     ("a time of 10^300 s", mapped(lambda rows: rows[0].update(rt="1e300")), "1e300 is out of range"),
     ("times alike", mapped(lambda rows: [row.update(rt="0.5") for row in rows]), "all 16 response times are 0.5 s"),

@@ -18,6 +18,7 @@ import pandas as pd
 
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
+from analysis.logs.doubtful_times import doubt_of_design, doubts_of_block
 from analysis.logs.files import (
     ENDINGS,
     LONGEST_MAPPED,
@@ -121,6 +122,8 @@ class _Batch:
     """Of logs of our own what there is to say of their journals, `None` where there is none."""
     kinds: dict[int, DataKind | None] = field(default_factory=dict)
     """Whose data each good log holds; None where nobody answered."""
+    doubts: dict[int, str] = field(default_factory=dict)
+    """What is wrong with the times of logs that keep every other rule."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -159,6 +162,7 @@ class _Reading:
             try:
                 if isinstance(log, BadLogError):
                     raise log
+                self.doubt(one, log, batch.doubts.get(number, ""), proven=batch.journals.get(number) is not None)
                 self.admit(number, one, log, study)
             except BadLogError as bad:
                 code = mapped.participant if mapped else code_in_name(one.path) or ""
@@ -167,6 +171,13 @@ class _Reading:
             else:
                 if number in batch.journals:
                     self.note(one, log, batch.journals[number])
+
+    def doubt(self, one: _Waiting, log: Log, said: str, *, proven: bool) -> None:
+        """Doubtful times leave a log out by `BadLogError`, unless its journal has proven it."""
+        if said and not proven:
+            raise BadLogError(said)
+        if said:
+            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
     def note(self, one: _Waiting, log: Log, said: str | None) -> None:
         """What there is to say of the journal of a log that was admitted."""
@@ -342,6 +353,7 @@ def _designed(
             reading.kinds[number * _LOGS_A_FILE] = kind_of_design(log)
             reading.admit(number * _LOGS_A_FILE, waiting, of_design, study)
             reading.note(waiting, of_design, log.journal)
+            reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
             logs[number * _LOGS_A_FILE] = log
         except BadLogError as bad:
             reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path), study))
@@ -429,6 +441,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
         else:
             batch.blocks.append(block)
             batch.kinds |= dict(kinds_of(block))
+            batch.doubts |= doubts_of_block(block)
             batch.logs |= logs
     return batch
 
