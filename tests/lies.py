@@ -217,6 +217,12 @@ def renamed(folder: Path) -> None:
     journal(folder, "direction").rename(path)
 
 
+def copied_log(folder: Path) -> None:
+    rows = [row | {"participant_id": "A01"} for row in rows_of(table(folder, "direction"))]
+    table(folder, "direction", "A01").parent.mkdir()
+    table(folder, "direction", "A01").write_bytes(written(rows))
+
+
 def copied_journal(folder: Path) -> None:
     shutil.copy(journal(folder, "direction", "P02"), journal(folder, "direction"))
 
@@ -259,6 +265,7 @@ onset_utc = "when"
 unit = "s"
 """
 PATTERN_MAP = MAP.replace('column = "who"', 'column = "who"\npattern = "(A[0-9])"')
+UNTIMED_MAP = MAP.replace('response_time = "rt"', "").replace('correct = "ok"', "")
 RATING_MAP = """
 experiment = "preference"
 [participant]
@@ -314,6 +321,19 @@ def said_of_strays(logs: Logs) -> str:
     assert found.direction is not None
     assert tuple(found.direction.participants.codes) == ("A1",)
     return "\n".join(f"{one.participant}: {one.reason} (rule: {one.rule}); {one.remedy}" for one in found.excluded)
+
+
+def other_way(way: str) -> str:
+    return {"forward": "backward", "backward": "forward"}[way]
+
+
+def unsure(who: str) -> Callable[[Rows], Rows]:
+    """Rows of somebody who is right in some of 32 trials, the same whoever it is."""
+    said = "0110100110010110" * 2
+    return lambda rows: [
+        row | {"who": who, "said": row["way"] if at == "1" else other_way(row["way"])}
+        for row, at in zip([*rows[:16], *rows[:16]], said, strict=True)
+    ]
 
 
 def dated(hour: str) -> Callable[[Rows], object]:
@@ -533,6 +553,11 @@ _DESIGNS: tuple[_Told, ...] = (
     ),
 )
 _JOURNALS: tuple[_Told, ...] = (
+    (
+        "a log copied under another code",
+        in_folder(copied_log),
+        "is the same log as that of participant P01 in ../sub-P01/sub-P01_task-direction_trials.csv: all that was",
+    ),
     ("a table edited after its run", in_folder(edit(",1,", ",2,")), "edited since the run; `recoil rebuild"),
     (
         "the journal's last line deleted, and the table edited",
@@ -713,6 +738,33 @@ _MAPS: tuple[_Told, ...] = (
         "a method misspelt in one row",
         mapped(lambda rows: rows[20].update(how="sofd"), say=said_of_strays),
         "A2: trials with 'sofd' (1), which 1 of 2 people has (rule: a method is one that half of the people have)",
+    ),
+    ("every row thrice", mapped(lambda rows: rows.extend(2 * [*map(dict, rows)])), "is one part several times over"),
+    (
+        "every row thrice, one after the other",
+        mapped(lambda rows: rows.__setitem__(slice(None), [dict(row) for row in rows for _ in range(3)])),
+        "is one part several times over, again from row 2 on: all that was asked and answered",
+    ),
+    (
+        "somebody's rows under another's code",
+        mapped(lambda rows: rows.extend(row | {"who": "A3"} for row in rows[:16])),
+        "participant A3 of a.csv: is the same log as that of participant A1: all that was asked and answered, and the "
+        "response times to the ms (rule: such rows are the same by chance less than once in 1,000,000,000",
+    ),
+    (
+        "ten of somebody's rows in another's log",
+        mapped(lambda rows: rows.__setitem__(slice(18, 28), [row | {"who": "A2"} for row in rows[2:12]])),
+        "10 rows or more are the same, here and there from rows 3 and 3 on as that of participant A1",
+    ),
+    (
+        "somebody's answers without times under another's code",
+        mapped(lambda rows: rows.extend([*unsure("A3")(rows), *unsure("A4")(rows)]), text=UNTIMED_MAP),
+        "participant A4 of a.csv: is the same log as that of participant A3: all that was asked and answered (rule:",
+    ),
+    (
+        "answers turned round",
+        mapped(lambda rows: [row.update(said=other_way(row["way"])) for row in rows], text=UNTIMED_MAP),
+        "each of 2 people is right in fewer than half of the trials, in 0 of 32 altogether",
     ),
     (
         "a participant's code that is empty",

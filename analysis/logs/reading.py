@@ -18,6 +18,7 @@ import pandas as pd
 
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
+from analysis.logs.doubles import Told, doubles, told_by_block, told_by_design
 from analysis.logs.doubtful_times import doubt_of_design, doubts_of_block
 from analysis.logs.files import (
     ENDINGS,
@@ -35,6 +36,7 @@ from analysis.logs.journals import BegunRun, RunFile, all_gone, compared, gone, 
 from analysis.logs.kinds import IN_REGISTER, begun_by_kind, kept_out, kind_of_design, kinds_of, kinds_there
 from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
+from analysis.logs.suspicions import copies, other_log, turned_round
 from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
 from experiments.record.tables import DataKind
@@ -122,8 +124,19 @@ class _Batch:
     """Of logs of our own what there is to say of their journals, `None` where there is none."""
     kinds: dict[int, DataKind | None] = field(default_factory=dict)
     """Whose data each good log holds; None where nobody answered."""
+    told: dict[str, list[Told]] = field(default_factory=dict)
+    """What the rows of logs tell, by experiment: to see copies."""
     doubts: dict[int, str] = field(default_factory=dict)
     """What is wrong with the times of logs that keep every other rule."""
+
+    def take(self, block: Block, logs: Mapping[int, Log | BadLogError]) -> None:
+        """Take over checked rows, and how it is with each log."""
+        self.blocks.append(block)
+        self.logs |= logs
+        self.kinds |= dict(kinds_of(block))
+        self.doubts |= doubts_of_block(block)
+        if told := told_by_block(block):
+            self.told.setdefault(block.experiment, []).append(told)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -147,14 +160,18 @@ class _Reading:
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
     """Who stands in the register of each results folder."""
     remarks: list[Problem] = field(default_factory=list)
-    proven: list[tuple[str, str, bool]] = field(default_factory=list)
+    proven: dict[int, tuple[str, str, bool]] = field(default_factory=dict)
     """Folder and code of each good log of our own, and whether it has a journal."""
+    told: dict[str, list[Told]] = field(default_factory=dict)
+    """What the rows of logs tell, by experiment."""
 
     def add(self, waiting: Sequence[_Waiting], batch: _Batch) -> None:
         """Take over the logs of some files."""
         self.blocks += batch.blocks
         self.kinds |= batch.kinds
         self.mapped |= batch.mapped.keys()
+        for experiment, told in batch.told.items():
+            self.told.setdefault(experiment, []).extend(told)
         files = {one.number: one for one in waiting}
         for number, log in sorted(batch.logs.items()):
             one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
@@ -170,7 +187,7 @@ class _Reading:
                 self.problems.append(bad.of(one.file, code, experiment, study))
             else:
                 if number in batch.journals:
-                    self.note(one, log, batch.journals[number])
+                    self.note(number, one, log, batch.journals[number])
 
     def doubt(self, one: _Waiting, log: Log, said: str, *, proven: bool) -> None:
         """Doubtful times leave a log out by `BadLogError`, unless its journal has proven it."""
@@ -179,9 +196,9 @@ class _Reading:
         if said:
             self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
-    def note(self, one: _Waiting, log: Log, said: str | None) -> None:
+    def note(self, number: int, one: _Waiting, log: Log, said: str | None) -> None:
         """What there is to say of the journal of a log that was admitted."""
-        self.proven.append((one.study, log.code, said is not None))
+        self.proven[number] = one.study, log.code, said is not None
         if said:
             self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
@@ -218,14 +235,30 @@ class _Reading:
             raise BadLogError(message, None, "participant_id")
         earlier.append(number)
 
+    def leave_copies(self) -> None:
+        """Leave out the logs that hold what others hold."""
+        proven = {number for number, (_, _, has_journal) in self.proven.items() if has_journal}
+        for experiment, told in self.told.items():
+            mine = [number for number in self.studies if self.experiments[number] == experiment]
+            for number, said in copies(doubles(told, mine), proven, self._seen_from):
+                self._leave(number, said)
+
+    def _seen_from(self, number: int, other: int) -> str:
+        """What the person of a log is called in what is said of another."""
+        return other_log(self.codes[number], self.files[number // _LOGS_A_FILE], self.files[other // _LOGS_A_FILE])
+
+    def _leave(self, number: int, said: str) -> None:
+        """Leave out a log that was admitted."""
+        if number in self.studies:
+            file, study = self.files[number // _LOGS_A_FILE], self.studies.pop(number)
+            self.problems.append(BadLogError(said).of(file, self.codes[number], self.experiments[number], study))
+
     def keep_out(self, first: DataKind) -> None:
         """Leave out the logs of other kinds of data than the first that is there."""
         for number in [*self.studies]:
             kind = self.kinds[number] or first
             if kind != first:
-                file, study = self.files[number // _LOGS_A_FILE], self.studies.pop(number)
-                bad = BadLogError(kept_out(kind, first))
-                self.problems.append(bad.of(file, self.codes[number], self.experiments[number], study))
+                self._leave(number, kept_out(kind, first))
 
     def runs_by_kind(self, runs: Iterable[RunFile], first: DataKind) -> Mapping[DataKind, list[RunFile]]:
         """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first."""
@@ -269,7 +302,8 @@ def read_logs(
     for waiting, batch in _checked_batches(_batches(found, track, made), mapping):
         reading.add(waiting, batch)
     designs = _designed(reading, {path: every[path] for path in every if path not in found}, track, len(found), made)
-    reading.remarks += gone(reading.proven)
+    reading.leave_copies()
+    reading.remarks += gone(reading.proven.values())
     kinds = kinds_there(reading.kinds[number] for number in reading.studies)
     if not include_synthetic:
         reading.keep_out(kinds[0])
@@ -282,8 +316,8 @@ def read_logs(
     return replace(
         first,
         problems=tuple(sorted(reading.problems, key=_by_place)),
-        remarks=tuple(reading.remarks),
-        notes=tuple(all_gone(reading.proven)),
+        remarks=(*reading.remarks, *turned_round(first.trials, first.files)),
+        notes=tuple(all_gone(reading.proven.values())),
         begun=tuple(begun_of[kinds[0]]),
         runs=tuple(runs_of[kinds[0]]),
         joined=tuple(
@@ -352,9 +386,11 @@ def _designed(
             of_design = Log(code=log.code, experiment=log.design.design)
             reading.kinds[number * _LOGS_A_FILE] = kind_of_design(log)
             reading.admit(number * _LOGS_A_FILE, waiting, of_design, study)
-            reading.note(waiting, of_design, log.journal)
+            reading.note(number * _LOGS_A_FILE, waiting, of_design, log.journal)
             reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
             logs[number * _LOGS_A_FILE] = log
+            if told := told_by_design(number * _LOGS_A_FILE, log.design, log.rows):
+                reading.told.setdefault(log.design.design, []).append(told)
         except BadLogError as bad:
             reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path), study))
     return logs
@@ -439,10 +475,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
         except BadLogError as bad:
             batch.logs |= dict.fromkeys(texts.logs, bad)
         else:
-            batch.blocks.append(block)
-            batch.kinds |= dict(kinds_of(block))
-            batch.doubts |= doubts_of_block(block)
-            batch.logs |= logs
+            batch.take(block, logs)
     return batch
 
 

@@ -1,0 +1,228 @@
+"""Logs that hold the same answers twice: rows copied within a log, or one person's under another's code.
+
+A stretch of rows is a double if it is the same in all that was asked, in what was answered and in the response times to
+the ms, and would be so by chance less often than once in 10^9. How often that is, a log says itself: of each row
+-ln(share of its answer among those to the same question) - ln(share of its time among the log's), summed over the rows
+of one copy, must be above ln 10^9 = 20.7. Stretches of ten rows are looked for wherever they stand; without times, only
+whole logs, and logs that are one block, or each row, several times over.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.logs.measures import MEASURES
+from analysis.logs.texts import Block, Coded
+from analysis.stats.arrays import BoolArray, FloatArray
+from experiments.design.config import DesignConfig
+
+STRETCH = 10
+"""So many rows with times are looked at together."""
+ODDS = 1e9
+_OFTEN = (2, 3, 5, 7)
+"""So many times over a log may be written; four times is twice two times."""
+
+Hashes = NDArray[np.uint64]
+_MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Told:
+    """What rows of logs tell, log after log: the logs' `number` and how many `rows` each has.
+
+    `asked` and `answer` are the same number for the same; an answer of 0 is none, and `time_ms` -1.
+    """
+
+    number: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    asked: Hashes
+    answer: Hashes
+    time_ms: NDArray[np.int64]
+
+    @property
+    def row(self) -> Hashes:
+        """A number for each row: the same for the same."""
+        return self.asked * _MIX[0] + self.answer * _MIX[1] + self.time_ms.astype(np.uint64) * _MIX[2]
+
+    @property
+    def place(self) -> NDArray[np.intp]:
+        """The place of the log that each row is of."""
+        return np.repeat(np.arange(len(self.rows)), self.rows)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Double:
+    """Two logs by number, the same one where it repeats itself; `at` these rows of both, from 1, the same begins.
+
+    `whole`: it does not end before the logs do. `timed`: response times are a part of it.
+    """
+
+    first: int
+    second: int
+    whole: bool
+    timed: bool
+    at: tuple[int, int] = (1, 1)
+
+
+def told_by_block(block: Block) -> Told | None:
+    """What the rows of trials tell; `None` of ratings, which are too few to tell copies from chance."""
+    measure = MEASURES[block.experiment]
+    if "response_time_s" not in block.columns or not len(block.log):
+        return None
+    asked = sum((_hashed(block.columns[name]) * _MIX[at] for at, name in enumerate(measure.asked)), np.uint64(0))
+    time_s = np.asarray(block.columns["response_time_s"], dtype=np.float64)
+    answer = _hashed(block.columns[measure.answer])
+    return Told(number=block.log, rows=block.rows, asked=asked, answer=answer, time_ms=_ms(time_s))
+
+
+def told_by_design(number: int, design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> Told | None:
+    """The same of a design's log; `None` where no question has a time."""
+    timed = [name for name, question in design.questions.items() if question.named_answers]
+    if not timed or not rows:
+        return None
+    factors = [name for name in rows[0] if name in design.factors]
+    times = [row[f"{timed[0]}_time_s"] for row in rows]
+    return Told(
+        number=np.array([number]),
+        rows=np.array([len(rows)]),
+        asked=np.array([_hash(repr([row[name] for name in factors])) for row in rows], dtype=np.uint64),
+        answer=np.array([_hash(repr([row[name] for name in design.questions])) for row in rows], dtype=np.uint64),
+        time_ms=_ms(np.array([np.nan if time is None else time for time in times], dtype=np.float64)),
+    )
+
+
+def _ms(time_s: FloatArray) -> NDArray[np.int64]:
+    return np.where(np.isnan(time_s), -1.0, np.rint(time_s * 1000.0)).astype(np.int64)
+
+
+def _hashed(column: object) -> Hashes:
+    if not isinstance(column, Coded):
+        raise TypeError("a column of few values is asked for")
+    values = [0 if value is None else _hash(str(value)) for value in column.values]
+    return np.array(values, dtype=np.uint64)[column.codes]
+
+
+@cache
+def _hash(text: str) -> int:
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest())
+
+
+def doubles(some: Iterable[Told], numbers: Iterable[int]) -> list[Double]:
+    """The doubles among logs of one experiment with these numbers; each log once, with the first that it is like."""
+    told = _chosen([*some], set(numbers))
+    if told is None:
+        return []
+    found: dict[int, Double] = {}
+    for double in (*_written_often(told), *_alike(told), *_stretches(told)):
+        found.setdefault(double.second, double)
+    return [found[number] for number in sorted(found)]
+
+
+def _chosen(some: Sequence[Told], numbers: set[int]) -> Told | None:
+    """All these logs together, in the order of their numbers."""
+    if not some:
+        return None
+    number, rows = (np.concatenate([getattr(one, name) for one in some]) for name in ("number", "rows"))
+    first = np.cumsum(rows) - rows
+    order = np.array([at for at in np.argsort(number).tolist() if int(number[at]) in numbers], dtype=np.intp)
+    if not order.size:
+        return None
+    at = np.concatenate([np.arange(first[one], first[one] + rows[one]) for one in order.tolist()])
+    cells = {name: np.concatenate([getattr(one, name) for one in some])[at] for name in ("asked", "answer", "time_ms")}
+    return Told(number=number[order], rows=rows[order], **cells)
+
+
+def _surprise(told: Told, rows: slice, copied: slice) -> float:
+    """How much `copied` rows surprise in nats, by the shares of answers and times in all `rows` of their log."""
+    asked, answer, time_ms = (cells[rows] for cells in (told.asked, told.answer, told.time_ms))
+    within = slice(copied.start - rows.start, copied.stop - rows.start)
+    of_answer = _count(asked * _MIX[0] + answer * _MIX[1]) / _count(asked)
+    of_time = np.where(time_ms < 0, 1.0, _count(time_ms) / max(1, np.count_nonzero(time_ms >= 0)))
+    return float(-np.log(of_answer[within] * of_time[within]).sum())
+
+
+def _count(values: Hashes | NDArray[np.int64]) -> FloatArray:
+    """How often each value is there."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return counts[places].astype(np.float64)
+
+
+def _is_rare(told: Told, rows: slice, copied: slice) -> bool:
+    return _surprise(told, rows, copied) > math.log(ODDS)
+
+
+def _slices(told: Told) -> list[slice]:
+    ends = np.cumsum(told.rows).tolist()
+    return [slice(end - count, end) for end, count in zip(ends, told.rows.tolist(), strict=True)]
+
+
+def _written_often(told: Told) -> Iterator[Double]:
+    """Logs that are one block several times over, or each row."""
+    row = told.row
+    for number, rows in zip(told.number.tolist(), _slices(told), strict=True):
+        own, count = row[rows], rows.stop - rows.start
+        for often in (one for one in _OFTEN if count % one == 0):
+            part = count // often
+            blocks = own[0] == own[part] and (own.reshape(often, part) == own[:part]).all()
+            if blocks or (own[0] == own[1] and (own.reshape(part, often) == own[::often, None]).all()):
+                copied = slice(rows.start, rows.start + (part if blocks else count))
+                surprise = _surprise(told, rows, copied) * (1.0 if blocks else (often - 1) / often)
+                if surprise > math.log(ODDS):
+                    again = part + 1 if blocks else 2
+                    timed = bool((told.time_ms[rows] >= 0).any())
+                    yield Double(first=number, second=number, whole=True, timed=timed, at=(1, again))
+                    break
+
+
+def _alike(told: Told) -> Iterator[Double]:
+    """Whole logs that are the same."""
+    row, first = told.row, dict[bytes, int]()
+    slices = _slices(told)
+    for place, rows in enumerate(slices):
+        before = first.setdefault(row[rows].tobytes(), place)
+        if before != place and _is_rare(told, rows, rows):
+            one, other = int(told.number[before]), int(told.number[place])
+            timed = bool((told.time_ms[rows] >= 0).any())
+            yield Double(first=one, second=other, whole=True, timed=timed)
+
+
+def _stretches(told: Told) -> Iterator[Double]:
+    """Stretches of rows with times that stand anywhere else as well."""
+    starts, hashes = _windows(told)
+    order = np.argsort(hashes, kind="stable")
+    new = np.append(True, np.diff(hashes[order]) != 0)[: order.size]
+    leads = starts[order][np.flatnonzero(new)[np.cumsum(new) - 1]]
+    copies = np.flatnonzero(~new)
+    pairs = np.stack([leads[copies], starts[order][copies]], axis=1)
+    place, slices = told.place, _slices(told)
+    begins, seen = np.cumsum(told.rows) - told.rows, set[tuple[int, int]]()
+    for one, other in pairs[np.argsort(pairs[:, 1], kind="stable")].tolist():
+        both = int(place[one]), int(place[other])
+        if both not in seen and _is_rare(told, slices[both[1]], slice(other, other + STRETCH)):
+            seen.add(both)
+            at = one - int(begins[both[0]]) + 1, other - int(begins[both[1]]) + 1
+            yield Double(
+                first=int(told.number[both[0]]), second=int(told.number[both[1]]), whole=False, timed=True, at=at
+            )
+
+
+def _windows(told: Told) -> tuple[NDArray[np.intp], Hashes]:
+    """Where stretches of answered rows with times begin, and a number for what each tells."""
+    full: BoolArray = (told.time_ms >= 0) & (told.answer != 0)
+    count = len(full) - STRETCH + 1
+    if count < 1:
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.uint64)
+    before, place, row = np.append(0, np.cumsum(full)), told.place, told.row
+    good = (before[STRETCH:] - before[:-STRETCH] == STRETCH) & (place[:count] == place[STRETCH - 1 :])
+    starts = np.flatnonzero(good)
+    hashes = np.zeros(starts.size, dtype=np.uint64)
+    for step in range(STRETCH):
+        hashes = hashes * _MIX[0] + (row[starts + step] ^ (row[starts + step] >> np.uint64(29)))
+    return starts, hashes

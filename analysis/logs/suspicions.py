@@ -1,0 +1,71 @@
+"""What logs show only beside each other: that one is a copy of another, and that all answers are turned round."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.logs.doubles import ODDS, STRETCH, Double
+from analysis.logs.files import Problem
+from analysis.stats.binomial import binomial_test_p
+
+Named = Callable[[int, int], str]
+"""What the person of a log is called in what is said of another log, by both numbers."""
+
+
+def copies(doubles: Iterable[Double], proven: Collection[int], named: Named) -> Iterator[tuple[int, str]]:
+    """The logs to leave out, each with what is said of it.
+
+    Of two that are alike from end to end one stays: the one that a journal proves, else the first. Where a part was
+    copied, nobody knows into which of both, so that both go, but for what a journal proves.
+    """
+    for double in doubles:
+        first, second = double.first, double.second
+        swap = double.whole and second in proven and first not in proven
+        stays, goes = (second, first) if swap else (first, second)
+        if stays == goes or double.whole or goes not in proven:
+            yield goes, _said(double, named(stays, goes), own=stays == goes)
+        if not double.whole and stays != goes and stays not in proven:
+            yield stays, _said(double, named(goes, stays), own=False)
+
+
+def _said(double: Double, other: str, *, own: bool) -> str:
+    same = "all that was asked and answered" + (", and the response times to the ms" if double.timed else "")
+    rule = f"(rule: such rows are the same by chance less than once in {ODDS:,.0f}; answers count once)"
+    if own and double.whole:
+        return f"is one part several times over, again from row {double.at[1]} on: {same} {rule}; take the copies out"
+    where = f"{STRETCH} rows or more are the same, here and there from rows {double.at[0]} and {double.at[1]} on"
+    if own:
+        return f"{where}: {same} {rule}; find out which of them are true"
+    shared = "is the same log" if double.whole else where
+    return f"{shared} as that of participant {other}: {same} {rule}; find out whose it is, and take the other away"
+
+
+def other_log(code: str, file: Path, beside: Path) -> str:
+    """A participant with their file, seen from another one's: no path says on which machine."""
+    return code if file == beside else f"{code} in {os.path.relpath(file, beside.parent)}"
+
+
+_CHANCE = 1e-3
+
+
+def turned_round(trials: pd.DataFrame, files: Iterable[Path]) -> Iterator[Problem]:
+    """What there is to say where nobody is right more often than by chance, and all together less often."""
+    known = trials[trials["correct"].notna()]
+    right = known.groupby("participant_id", observed=True)["correct"].agg(["sum", "size"]).astype(np.int64)
+    total, count = int(right["sum"].sum()), int(right["size"].sum())
+    if not count or (2 * right["sum"] >= right["size"]).any() or binomial_test_p(total, count, 0.5, "less") >= _CHANCE:
+        return
+    people = f"each of {len(right)} people is" if len(right) > 1 else "the one participant is"
+    yield Problem(
+        file=Path(os.path.commonpath([*map(str, files)])),
+        line=None,
+        column=None,
+        message=f"{people} right in fewer than half of the trials, in {total} of {count} altogether "
+        f"(p < {_CHANCE:g} by guessing): are answers or directions turned round, by the map, in the files, or by how "
+        "the gun was held? A log cannot tell by itself; a column `correct` of the program that asked can",
+    )
