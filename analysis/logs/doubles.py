@@ -49,7 +49,8 @@ class Told:
     @property
     def row(self) -> Hashes:
         """A number for each row: the same for the same."""
-        return self.asked * _MIX[0] + self.answer * _MIX[1] + self.time_ms.astype(np.uint64) * _MIX[2]
+        found: Hashes = self.asked * _MIX[0] + self.answer * _MIX[1] + self.time_ms.astype(np.uint64) * _MIX[2]
+        return found
 
     @property
     def place(self) -> NDArray[np.intp]:
@@ -76,7 +77,9 @@ def told_by_block(block: Block) -> Told | None:
     measure = MEASURES[block.experiment]
     if "response_time_s" not in block.columns or not len(block.log):
         return None
-    asked = sum((_hashed(block.columns[name]) * _MIX[at] for at, name in enumerate(measure.asked)), np.uint64(0))
+    asked = np.zeros(int(block.rows.sum()), dtype=np.uint64)
+    for name in measure.asked:
+        asked = asked * _MIX[0] + _hashed(block.columns[name])
     time_s = np.asarray(block.columns["response_time_s"], dtype=np.float64)
     answer = _hashed(block.columns[measure.answer])
     return Told(number=block.log, rows=block.rows, asked=asked, answer=answer, time_ms=_ms(time_s))
@@ -144,7 +147,8 @@ def _surprise(told: Told, rows: slice, copied: slice) -> float:
     asked, answer, time_ms = (cells[rows] for cells in (told.asked, told.answer, told.time_ms))
     within = slice(copied.start - rows.start, copied.stop - rows.start)
     of_answer = _count(asked * _MIX[0] + answer * _MIX[1]) / _count(asked)
-    of_time = np.where(time_ms < 0, 1.0, _count(time_ms) / max(1, np.count_nonzero(time_ms >= 0)))
+    timed = max(1, int(np.count_nonzero(time_ms >= 0)))
+    of_time = np.where(time_ms < 0, 1.0, _count(time_ms) / timed)
     return float(-np.log(of_answer[within] * of_time[within]).sum())
 
 

@@ -25,6 +25,7 @@ where they have the columns; then participants.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -116,14 +117,14 @@ def shared_methods(table: pd.DataFrame) -> set[str]:
 def _strayed(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> dict[str, tuple[str, str, str]]:
     """Who has a method that is none of these, by which rule, and what to do, by code."""
     stray = table[~table["method"].isin(list(methods))]
-    rows = stray.groupby(["participant_id", "method"], observed=True).size()
-    have, people = stray.groupby("method", observed=True)["participant_id"].nunique(), table["participant_id"].nunique()
+    pairs = zip(stray["participant_id"].astype(str), stray["method"].astype(str), strict=True)
+    rows, people = Counter(pairs), table["participant_id"].nunique()
+    have = Counter(method for _, method in rows)
     noun = "ratings of" if is_rated(experiment) else "trials with"
     said: dict[str, list[str]] = {}
     for (code, method), count in rows.items():
-        verb = "has" if have[method] == 1 else "have"
-        who = f"{have[method]} of {people} people {verb}"
-        said.setdefault(str(code), []).append(f"{noun} {method!r} ({count}), which {who}")
+        who = f"{have[method]} of {people} people {'has' if have[method] == 1 else 'have'}"
+        said.setdefault(code, []).append(f"{noun} {method!r} ({count}), which {who}")
     return {code: ("; ".join(some), *_STRAY) for code, some in said.items()}
 
 
