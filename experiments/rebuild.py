@@ -40,9 +40,11 @@ def misnamed(path: Path, plan: Plan) -> str:
     name = JOURNAL_NAME.search(path.name)
     if name is None or (name[1], name[2]) == (plan.participant_id, plan.experiment):
         return ""
-    rule = "(rule: a journal lies under the code and experiment of its run)"
-    back = f"sub-{plan.participant_id}/sub-{plan.participant_id}_task-{plan.experiment}{ENDING}"
-    return f"is of participant {plan.participant_id}, experiment {plan.experiment}; was it renamed? {rule}: {back}"
+    back = f"sub-{plan.participant_id}_task-{plan.experiment}{ENDING}"
+    return (
+        f"is of participant {plan.participant_id}, experiment {plan.experiment}; was it renamed? (rule: a journal is "
+        f"called as its run, {back}); put it back there, and the right one here"
+    )
 
 
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:

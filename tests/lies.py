@@ -329,7 +329,7 @@ def other_way(way: str) -> str:
 
 def unsure(who: str) -> Callable[[Rows], Rows]:
     """Rows of somebody who is right in some of 32 trials, the same whoever it is."""
-    said = "0110100110010110" * 2
+    said = "01101001100101101101001110010100"
     return lambda rows: [
         row | {"who": who, "said": row["way"] if at == "1" else other_way(row["way"])}
         for row, at in zip([*rows[:16], *rows[:16]], said, strict=True)
@@ -554,9 +554,14 @@ _DESIGNS: tuple[_Told, ...] = (
 )
 _JOURNALS: tuple[_Told, ...] = (
     (
+        "the whole folder again, as a backup",
+        in_folder(lambda folder: shutil.copytree(folder, folder / "the-backup")),
+        "holds what ../../sub-P01/sub-P01_task-preference_ratings.csv holds, byte for byte (rule: a run counts once)",
+    ),
+    (
         "a log copied under another code",
         in_folder(copied_log),
-        "is the same log as that of participant P01 in ../sub-P01/sub-P01_task-direction_trials.csv: all that was",
+        "holds what the log of participant P01 in ../sub-P01/sub-P01_task-direction_trials.csv holds: all that was",
     ),
     ("a table edited after its run", in_folder(edit(",1,", ",2,")), "edited since the run; `recoil rebuild"),
     (
@@ -582,7 +587,7 @@ _JOURNALS: tuple[_Told, ...] = (
     (
         "a journal copied over another's, to be rebuilt",
         rebuilt(copied_journal),
-        "(rule: a journal lies under the code and experiment of its run): sub-P02/sub-P02_task-direction_journal.jsonl",
+        "(rule: a journal is called as its run, sub-P02_task-direction_journal.jsonl); put it back there, and the right",
     ),
     (
         "the table of a finished run gone",
@@ -748,18 +753,18 @@ _MAPS: tuple[_Told, ...] = (
     (
         "somebody's rows under another's code",
         mapped(lambda rows: rows.extend(row | {"who": "A3"} for row in rows[:16])),
-        "participant A3 of a.csv: is the same log as that of participant A1: all that was asked and answered, and the "
-        "response times to the ms (rule: such rows are the same by chance less than once in 1,000,000,000",
+        "participant A3 of a.csv: holds what the log of participant A1 holds: all that was asked and answered, and the "
+        "response times to the ms (rule: by chance that is so less than once in 1,000,000,000, and answers count once)",
     ),
     (
         "ten of somebody's rows in another's log",
         mapped(lambda rows: rows.__setitem__(slice(18, 28), [row | {"who": "A2"} for row in rows[2:12]])),
-        "10 rows or more are the same, here and there from rows 3 and 3 on as that of participant A1",
+        "participant A2 of a.csv: rows 3 to 12 at least are rows 3 to 12 of participant A1: all that was asked and",
     ),
     (
         "somebody's answers without times under another's code",
         mapped(lambda rows: rows.extend([*unsure("A3")(rows), *unsure("A4")(rows)]), text=UNTIMED_MAP),
-        "participant A4 of a.csv: is the same log as that of participant A3: all that was asked and answered (rule:",
+        "participant A4 of a.csv: holds what the log of participant A3 holds: all that was asked and answered (rule:",
     ),
     (
         "answers turned round",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
-from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name, read_content
+from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name
 from analysis.logs.journals import compared_with, journal_of
 from analysis.logs.names import gun_labels
 from experiments.config.setup import sha256
@@ -55,12 +55,10 @@ def is_of_design(path: str) -> bool:
     return experiment_in_name(path) not in ("", *TABLES)
 
 
-def read_design_log(path: str, made: bytes | None = None) -> DesignLog:
-    """A log and its design; the table that its journal `made`, if it has none.
-
-    `BadLogError`: it breaks a rule, or nothing says what its columns mean.
-    """
-    content = read_content(path) if made is None else made
+def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
+    """A log and its design. `BadLogError`: it breaks a rule, or nothing says what its columns mean."""
+    if isinstance(content, BadLogError):
+        raise content
     check_length(content)
     data, design, head = _design_of(path)
     rows = tuple(_rows(content, design))

@@ -4,7 +4,7 @@ A stretch of rows is a double if it is the same in all that was asked, in what w
 the ms, and would be so by chance less often than once in 10^9. How often that is, a log says itself: of each row
 -ln(share of its answer among those to the same question) - ln(share of its time among the log's), summed over the rows
 of one copy, must be above ln 10^9 = 20.7. Stretches of ten rows are looked for wherever they stand; without times, only
-whole logs, and logs that are one block, or each row, several times over.
+whole logs, and logs that are one block, or each row, several times over; of these, all that are so together.
 """
 
 from __future__ import annotations
@@ -168,21 +168,37 @@ def _slices(told: Told) -> list[slice]:
 
 
 def _written_often(told: Told) -> Iterator[Double]:
-    """Logs that are one block several times over, or each row."""
+    """Logs that are one block several times over, or each row; those in the same way are judged together."""
+    by_way: dict[tuple[int, bool], list[tuple[float, Double]]] = {}
     row = told.row
     for number, rows in zip(told.number.tolist(), _slices(told), strict=True):
-        own, count = row[rows], rows.stop - rows.start
-        for often in (one for one in _OFTEN if count % one == 0):
-            part = count // often
-            blocks = own[0] == own[part] and (own.reshape(often, part) == own[:part]).all()
-            if blocks or (own[0] == own[1] and (own.reshape(part, often) == own[::often, None]).all()):
-                copied = slice(rows.start, rows.start + (part if blocks else count))
-                surprise = _surprise(told, rows, copied) * (1.0 if blocks else (often - 1) / often)
-                if surprise > math.log(ODDS):
-                    again = part + 1 if blocks else 2
-                    timed = bool((told.time_ms[rows] >= 0).any())
-                    yield Double(first=number, second=number, whole=True, timed=timed, at=(1, again))
-                    break
+        way = _way(row[rows])
+        if way is not None:
+            often, blocks = way
+            part = (rows.stop - rows.start) // often
+            copied = slice(rows.start, rows.start + part) if blocks else rows
+            surprise = _surprise(told, rows, copied) * (often - 1) / (1 if blocks else often)
+            at = 1, part + 1 if blocks else 2
+            double = Double(first=number, second=number, whole=True, timed=_timed(told, rows), at=at)
+            by_way.setdefault(way, []).append((surprise, double))
+    for some in by_way.values():
+        if sum(surprise for surprise, _ in some) > math.log(ODDS):
+            yield from (double for _, double in some)
+
+
+def _way(row: Hashes) -> tuple[int, bool] | None:
+    """How often a log is written over, and whether block after block or each row; `None` if once."""
+    for often in (one for one in _OFTEN if len(row) % one == 0):
+        part = len(row) // often
+        if row[0] == row[part] and (row.reshape(often, part) == row[:part]).all():
+            return often, True
+        if row[0] == row[1] and (row.reshape(part, often) == row[::often, None]).all():
+            return often, False
+    return None
+
+
+def _timed(told: Told, rows: slice) -> bool:
+    return bool((told.time_ms[rows] >= 0).any())
 
 
 def _alike(told: Told) -> Iterator[Double]:
@@ -193,8 +209,7 @@ def _alike(told: Told) -> Iterator[Double]:
         before = first.setdefault(row[rows].tobytes(), place)
         if before != place and _is_rare(told, rows, rows):
             one, other = int(told.number[before]), int(told.number[place])
-            timed = bool((told.time_ms[rows] >= 0).any())
-            yield Double(first=one, second=other, whole=True, timed=timed)
+            yield Double(first=one, second=other, whole=True, timed=_timed(told, rows))
 
 
 def _stretches(told: Told) -> Iterator[Double]:

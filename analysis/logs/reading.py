@@ -7,6 +7,7 @@ in `remarks`, and who has only begun in `begun`.
 from __future__ import annotations
 
 import os
+import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -52,6 +53,7 @@ _BATCH_BYTES = 4 << 20
 _BATCHES_AHEAD = 4
 """So many are read from disk while others are checked."""
 
+_ONSET = re.compile(rb"T\d\d:\d\d:\d\d\.\d{6}Z")
 _LOGS_A_FILE = 1 << 20
 """Numbers of logs are so far apart from file to file: a mapped file may hold several."""
 
@@ -157,6 +159,8 @@ class _Reading:
     """The files of good logs, numbered."""
     mapped: set[int] = field(default_factory=set)
     """The numbers of the logs that other programs wrote."""
+    contents: dict[int, Path] = field(default_factory=dict)
+    """The file that first held each content."""
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
     """Who stands in the register of each results folder."""
     remarks: list[Problem] = field(default_factory=list)
@@ -211,6 +215,7 @@ class _Reading:
             said = f"participant {log.code} is excluded: {reason} ({how} readmits them)"
             raise BadLogError(f"{said} (rule: {IN_REGISTER})")
         self._check_new(study, log, number)
+        self._check_no_copy(one)
         self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
         self.files[number // _LOGS_A_FILE] = one.file
 
@@ -234,6 +239,15 @@ class _Reading:
             message = f"{name} has a {log.experiment} log already in {self.files[first // _LOGS_A_FILE]} {rule}"
             raise BadLogError(message, None, "participant_id")
         earlier.append(number)
+
+    def _check_no_copy(self, one: _Waiting) -> None:
+        """`BadLogError`: the same table, with onsets to the µs, stood elsewhere, as in a copy of the folder."""
+        if not isinstance(one.content, bytes) or not _ONSET.search(one.content):
+            return
+        same = self.contents.setdefault(hash(one.content), one.file)
+        if same != one.file:
+            where = os.path.relpath(same, one.file.parent)
+            raise BadLogError(f"holds what {where} holds, byte for byte (rule: a run counts once); read one of both")
 
     def leave_copies(self) -> None:
         """Leave out the logs that hold what others hold."""
@@ -380,9 +394,9 @@ def _designed(
     logs: dict[int, DesignLog] = {}
     files = zip(found.items(), track([Path(path) for path in found]), strict=True) if found else ()
     for number, ((path, study), file) in enumerate(files, start=first):
-        waiting = _Waiting(number=number, file=file, path=path, study=study, content=b"")
+        waiting = _Waiting(number=number, file=file, path=path, study=study, content=made.get(path) or _content(path))
         try:
-            log = read_design_log(path, made.get(path))
+            log = read_design_log(path, waiting.content)
             of_design = Log(code=log.code, experiment=log.design.design)
             reading.kinds[number * _LOGS_A_FILE] = kind_of_design(log)
             reading.admit(number * _LOGS_A_FILE, waiting, of_design, study)

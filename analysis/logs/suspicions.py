@@ -21,28 +21,42 @@ def copies(doubles: Iterable[Double], proven: Collection[int], named: Named) -> 
     """The logs to leave out, each with what is said of it.
 
     Of two that are alike from end to end one stays: the one that a journal proves, else the first. Where a part was
-    copied, nobody knows into which of both, so that both go, but for what a journal proves.
+    copied, nobody knows into which of both, so that both go, but for what a journal proves; what repeats itself goes.
     """
     for double in doubles:
         first, second = double.first, double.second
-        swap = double.whole and second in proven and first not in proven
-        stays, goes = (second, first) if swap else (first, second)
-        if stays == goes or double.whole or goes not in proven:
-            yield goes, _said(double, named(stays, goes), own=stays == goes)
-        if not double.whole and stays != goes and stays not in proven:
-            yield stays, _said(double, named(goes, stays), own=False)
+        if first == second:
+            yield first, _said_of_itself(double)
+        elif double.whole:
+            swap = second in proven and first not in proven
+            stays, goes = (second, first) if swap else (first, second)
+            yield goes, f"holds what the log of participant {named(stays, goes)} holds: {_same(double)}"
+        else:
+            both = (first, second, double.at), (second, first, double.at[::-1])
+            yield from (
+                (
+                    goes,
+                    f"{_rows(at[0])} at least are {_rows(at[1])} of participant {named(other, goes)}: {_same(double)}",
+                )
+                for goes, other, at in both
+                if goes not in proven
+            )
 
 
-def _said(double: Double, other: str, *, own: bool) -> str:
+def _said_of_itself(double: Double) -> str:
+    if double.whole:
+        return f"is one part several times over, again from row {double.at[1]} on: {_same(double)}"
+    return f"{_rows(double.at[1])} at least repeat {_rows(double.at[0])}: {_same(double)}"
+
+
+def _rows(first: int) -> str:
+    return f"rows {first} to {first + STRETCH - 1}"
+
+
+def _same(double: Double) -> str:
     same = "all that was asked and answered" + (", and the response times to the ms" if double.timed else "")
-    rule = f"(rule: such rows are the same by chance less than once in {ODDS:,.0f}; answers count once)"
-    if own and double.whole:
-        return f"is one part several times over, again from row {double.at[1]} on: {same} {rule}; take the copies out"
-    where = f"{STRETCH} rows or more are the same, here and there from rows {double.at[0]} and {double.at[1]} on"
-    if own:
-        return f"{where}: {same} {rule}; find out which of them are true"
-    shared = "is the same log" if double.whole else where
-    return f"{shared} as that of participant {other}: {same} {rule}; find out whose it is, and take the other away"
+    rule = f"(rule: by chance that is so less than once in {ODDS:,.0f}, and answers count once)"
+    return f"{same} {rule}; find out whose they are, and take the copy out"
 
 
 def other_log(code: str, file: Path, beside: Path) -> str:
