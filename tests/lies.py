@@ -328,12 +328,22 @@ def other_way(way: str) -> str:
 
 
 def unsure(who: str) -> Callable[[Rows], Rows]:
-    """Rows of somebody who is right in some of 32 trials, the same whoever it is."""
-    said = "01101001100101101101001110010100"
+    """Rows of somebody who is right in some of 64 trials, the same whoever it is."""
     return lambda rows: [
-        row | {"who": who, "said": row["way"] if at == "1" else other_way(row["way"])}
-        for row, at in zip([*rows[:16], *rows[:16]], said, strict=True)
+        rows[n % 16] | {"who": who, "said": rows[n % 16]["way"] if right == "1" else other_way(rows[n % 16]["way"])}
+        for n, right in enumerate(f"{0x9E3779B97F4A7C15:064b}")
     ]
+
+
+def copied(change: Callable[[Rows], object]) -> Callable[[Rows], object]:
+    """What is copied of rows whose times are as irregular as people's are."""
+
+    def told(rows: Rows) -> None:
+        for n, row in enumerate(rows):
+            row["rt"] = f"{0.3 + (37 * n**3 + 11 * n) % 613 / 1000:.3f}"
+        change(rows)
+
+    return told
 
 
 def dated(hour: str) -> Callable[[Rows], object]:
@@ -587,7 +597,7 @@ _JOURNALS: tuple[_Told, ...] = (
     (
         "a journal copied over another's, to be rebuilt",
         rebuilt(copied_journal),
-        "(rule: a journal is called as its run, sub-P02_task-direction_journal.jsonl); put it back there, and the right",
+        "(rule: a journal is called as its run, sub-P02_task-direction_journal.jsonl); put it back there, and the",
     ),
     (
         "the table of a finished run gone",
@@ -744,21 +754,25 @@ _MAPS: tuple[_Told, ...] = (
         mapped(lambda rows: rows[20].update(how="sofd"), say=said_of_strays),
         "A2: trials with 'sofd' (1), which 1 of 2 people has (rule: a method is one that half of the people have)",
     ),
-    ("every row thrice", mapped(lambda rows: rows.extend(2 * [*map(dict, rows)])), "is one part several times over"),
+    (
+        "every row thrice",
+        mapped(copied(lambda rows: rows.extend(2 * [*map(dict, rows)]))),
+        "is one part several times over",
+    ),
     (
         "every row thrice, one after the other",
-        mapped(lambda rows: rows.__setitem__(slice(None), [dict(row) for row in rows for _ in range(3)])),
+        mapped(copied(lambda rows: rows.__setitem__(slice(None), [dict(row) for row in rows for _ in range(3)]))),
         "is one part several times over, again from row 2 on: all that was asked and answered",
     ),
     (
         "somebody's rows under another's code",
-        mapped(lambda rows: rows.extend(row | {"who": "A3"} for row in rows[:16])),
+        mapped(copied(lambda rows: rows.extend(row | {"who": "A3"} for row in rows[:16]))),
         "participant A3 of a.csv: holds what the log of participant A1 holds: all that was asked and answered, and the "
         "response times to the ms (rule: by chance that is so less than once in 1,000,000,000, and answers count once)",
     ),
     (
         "ten of somebody's rows in another's log",
-        mapped(lambda rows: rows.__setitem__(slice(18, 28), [row | {"who": "A2"} for row in rows[2:12]])),
+        mapped(copied(lambda rows: rows.__setitem__(slice(18, 28), [row | {"who": "A2"} for row in rows[2:12]]))),
         "participant A2 of a.csv: rows 3 to 12 at least are rows 3 to 12 of participant A1: all that was asked and",
     ),
     (
@@ -875,9 +889,43 @@ counted among those who are left out; everybody else is analysed.
 """
 
 
+_TAIL = """
+## What is taken for a copy
+
+- A table of our own with onsets is a copy of another if both are the same byte for byte: the folder was copied.
+- Rows of trials are copies of others if they are the same in all that was asked, in the answers and in the response
+  times to the ms, and would be so by chance less than once in 10^9. A log says by itself how rare its rows are: each
+  counts −ln(share of its answer among those to the same question) − ln(share of its time among its times), and the sum
+  over the rows of one copy is above ln 10^9 = 20.7; where answers follow the answer before, or times go on in equal
+  steps, as made ones do, the shares are those of what followed it, and of the steps. Stretches of ten rows with times
+  are looked for wherever they stand. Without times whole logs are compared with each other, and a log with itself: is
+  it one part twice, thrice, five or seven times over, or each of its rows? Logs that are so in the same way are judged
+  by the sum of them all.
+- Of two logs that are alike from end to end one stays, the one that a journal proves, else the first: the same answers
+  count once. Where a part was copied, both are left out but for what a journal proves.
+
+## Which times no log has
+
+Half of the response times above 60 s; ten or more onsets that are all the same; onsets before the year 2000, or more
+than 366 days ahead of the clock of the computer that analyses; a participant's own response time that is more than a
+second longer than the time to the next onset (a minute, where onsets are given in whole minutes). A log that its
+journal proves is used with a remark: its clock was wrong, not its answers.
+
+## What cannot be known
+
+- Answers that are turned round, where no column `correct` says what was right: a remark is made if nobody is right in
+  half of the trials, and all together are so by guessing less than once in a thousand. People who are sometimes right
+  and sometimes wrong look the same either way, as do answers that were copied from the column of directions.
+- Copies of fewer than ten rows, of a part of a log without times, of people who are nearly always right and have no
+  times, of ratings, and copies in which every time was changed by some ms.
+- Whether the unit of response times is right where both readings are human: 1 to 60 are taken as they are.
+- Tables without any journal: that is said, and they are read.
+"""
+
+
 def page() -> str:
-    """The table as Markdown."""
-    return _HEAD + "".join(f"| {lie.what} | {lie.how} | {_cell(lie.said)} |\n" for lie in LIES)
+    """The table as Markdown, and the rules that it does not show."""
+    return _HEAD + "".join(f"| {lie.what} | {lie.how} | {_cell(lie.said)} |\n" for lie in LIES) + _TAIL
 
 
 def _cell(text: str) -> str:

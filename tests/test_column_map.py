@@ -162,7 +162,7 @@ def test_a_pattern_takes_the_code_out_of_the_column(tmp_path: Path) -> None:
 
 
 def test_who_does_not_fit_the_pattern_is_named_in_the_map(tmp_path: Path) -> None:
-    rows = [row for code in ("VP_01", "guest") for row in _psychopy(trial_rows(code))]
+    rows = [row for seed, code in enumerate(("VP_01", "guest")) for row in _psychopy(trial_rows(code, seed))]
     path = _write(tmp_path / "all.csv", rows)
     (problem,) = _read(path, _by_pattern(r"VP_(\d+)")).problems
     assert "'guest' has no participant's code" in str(problem)

@@ -104,7 +104,8 @@ def test_who_answered_nothing_is_of_the_kind_of_the_others(tmp_path: Path) -> No
 
 def test_the_same_code_may_be_a_persons_and_a_synthetic_ones_but_only_once_each(tmp_path: Path) -> None:
     logs = [
-        log_of(tmp_path / name, "P01", kind, 1) for name, kind in (("a", "synthetic"), ("b", "real"), ("c", "real"))
+        log_of(tmp_path / name, "P01", kind, seed)
+        for seed, (name, kind) in enumerate((("a", "synthetic"), ("b", "real"), ("c", "real")))
     ]
     moved = [path.rename(tmp_path / f"{number}.csv") for number, path in enumerate(logs)]
     found = read_logs(moved, include_synthetic=True)

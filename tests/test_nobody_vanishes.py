@@ -50,7 +50,7 @@ def broken_off(folder: Path, code: str, records: int) -> Path:
 def test_unanswered_trials_are_told_with_everybody_and_the_remedy(recoil: Recoil, tmp_path: Path) -> None:
     results = write_study(tmp_path / "results", participants=4)
     for code, missing in (("P02", 1), ("P04", 2)):
-        rows = trial_rows(code, 7)
+        rows = trial_rows(code, missing)
         for row in rows[:missing]:
             row.update(response="", correct="")
         write_rows(trials_path(results, code), rows)

@@ -224,8 +224,8 @@ def test_figures_and_tables_are_numbered_from_one(full: Path) -> None:
 
 
 def test_times_by_the_experimenters_hand_are_no_response_times(tmp_path: Path) -> None:
-    for code in ("P01", "P02"):
-        rows = [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in trial_rows(code)]
+    for seed, code in enumerate(("P01", "P02")):
+        rows = [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in trial_rows(code, seed)]
         write_rows(trials_path(tmp_path / "study", code), rows)
     write_report(tmp_path / "out", ReportData(title="Hand", statistics=summarize(read_logs([tmp_path / "study"]))))
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")

@@ -238,8 +238,8 @@ def by_hand(rows: list[TextRow]) -> list[TextRow]:
 
 
 def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path: Path) -> None:
-    for code in ("P01", "P02"):
-        write_rows(trials_path(tmp_path / "study", code), by_hand(trial_rows(code)))
+    for seed, code in enumerate(("P01", "P02")):
+        write_rows(trials_path(tmp_path / "study", code), by_hand(trial_rows(code, seed)))
     statistics = summarize(read_logs([tmp_path / "study"]))
     found = statistics.to_dict()["direction"]["speed_accuracy"]
     assert (found["n"], found["answered"], found["methods"]) == (0, 120, {})
@@ -288,8 +288,9 @@ def test_a_log_without_the_column_is_one_without_instructions(tmp_path: Path) ->
 
 
 def test_instructions_nobody_knows_are_kept_as_they_are(tmp_path: Path) -> None:
-    for code in ("P01", "P02"):
-        rows = [row | {"instruction": ("speed", "be brave, 100 %")[k % 2]} for k, row in enumerate(trial_rows(code))]
+    for seed, code in enumerate(("P01", "P02")):
+        told = enumerate(trial_rows(code, seed))
+        rows = [row | {"instruction": ("speed", "be brave, 100 %")[k % 2]} for k, row in told]
         write_rows(trials_path(tmp_path, code), rows)
     logs = read_logs([tmp_path])
     assert not logs.problems

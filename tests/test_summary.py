@@ -101,7 +101,7 @@ def test_response_times_count_only_where_they_are_the_participants_own(tmp_path:
 
 def test_participants_who_miss_an_answer_or_a_method_are_left_out_and_listed(tmp_path: Path) -> None:
     write_study(tmp_path, participants=5)
-    trials = trial_rows("P02")
+    trials = trial_rows("P02", 2)
     trials[4].update(response="", correct="")
     write_rows(trials_path(tmp_path, "P02"), trials)
     write_rows(trials_path(tmp_path, "P03"), trial_rows("P03", methods=METHODS[:2]))

@@ -3,8 +3,10 @@
 A stretch of rows is a double if it is the same in all that was asked, in what was answered and in the response times to
 the ms, and would be so by chance less often than once in 10^9. How often that is, a log says itself: of each row
 -ln(share of its answer among those to the same question) - ln(share of its time among the log's), summed over the rows
-of one copy, must be above ln 10^9 = 20.7. Stretches of ten rows are looked for wherever they stand; without times, only
-whole logs, and logs that are one block, or each row, several times over; of these, all that are so together.
+of one copy, must be above ln 10^9 = 20.7. Of answers that follow the one before, and times in equal steps, as made ones
+are, the shares are those among what followed it and among the steps, where these surprise less. Stretches of ten rows
+are looked for wherever they stand; without times, only whole logs, and logs that are one block, or each row, several
+times over; of these, all that are so together.
 """
 
 from __future__ import annotations
@@ -143,13 +145,32 @@ def _chosen(some: Sequence[Told], numbers: set[int]) -> Told | None:
 
 
 def _surprise(told: Told, rows: slice, copied: slice) -> float:
-    """How much `copied` rows surprise in nats, by the shares of answers and times in all `rows` of their log."""
-    asked, answer, time_ms = (cells[rows] for cells in (told.asked, told.answer, told.time_ms))
+    """How much `copied` rows surprise in nats, by what all `rows` of their log hold."""
     within = slice(copied.start - rows.start, copied.stop - rows.start)
-    of_answer = _count(asked * _MIX[0] + answer * _MIX[1]) / _count(asked)
-    timed = max(1, int(np.count_nonzero(time_ms >= 0)))
-    of_time = np.where(time_ms < 0, 1.0, _count(time_ms) / timed)
-    return float(-np.log(of_answer[within] * of_time[within]).sum())
+    answers = _of_answers(told.asked[rows], told.answer[rows])
+    times = _of_times(told.time_ms[rows])
+    return sum(min(float(nats[within].sum()) for nats in ways) for ways in (answers, times))
+
+
+def _of_answers(asked: Hashes, answer: Hashes) -> tuple[FloatArray, FloatArray]:
+    """The surprise of each answer among those to the same question, and among those after the same answer to it."""
+    plain = -np.log(_count(asked * _MIX[0] + answer * _MIX[1]) / _count(asked))
+    order = np.argsort(asked, kind="stable")
+    before = np.empty_like(answer)
+    before[order] = np.append(answer[order][:1], answer[order][:-1])
+    new = np.empty(len(asked), dtype=np.bool_)
+    new[order] = np.append(True, np.diff(asked[order]) != 0)
+    context = asked * _MIX[0] + np.where(new, np.uint64(1), before) * _MIX[2]
+    after = -np.log(_count(context + answer * _MIX[1]) / _count(context))
+    return plain, np.where(new, plain, after)
+
+
+def _of_times(time_ms: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """The surprise of each time among the log's, and of its step from the time before; none where there is no time."""
+    there, steps = time_ms >= 0, np.diff(time_ms, prepend=time_ms[:1])
+    count = max(1, int(np.count_nonzero(there)))
+    plain, step = (np.where(there, -np.log(np.minimum(1.0, _count(some) / count)), 0.0) for some in (time_ms, steps))
+    return plain, step
 
 
 def _count(values: Hashes | NDArray[np.int64]) -> FloatArray:
