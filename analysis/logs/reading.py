@@ -7,20 +7,19 @@ in `remarks`, and who has only begun in `begun`.
 from __future__ import annotations
 
 import os
-import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import get_args
 
 import pandas as pd
 
+from analysis.logs.admission import LOGS_A_FILE, Batch, Reading, Waiting
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
-from analysis.logs.doubles import Told, doubles, told_by_block, told_by_design
-from analysis.logs.doubtful_times import doubt_of_design, doubts_of_block
+from analysis.logs.doubles import told_by_design
+from analysis.logs.doubtful_times import doubt_of_design
 from analysis.logs.files import (
     ENDINGS,
     LONGEST_MAPPED,
@@ -34,14 +33,13 @@ from analysis.logs.files import (
     study_names,
 )
 from analysis.logs.journals import BegunRun, RunFile, all_gone, compared, gone, made_again, run_file, without_table
-from analysis.logs.kinds import IN_REGISTER, begun_by_kind, kept_out, kind_of_design, kinds_of, kinds_there
+from analysis.logs.kinds import begun_by_kind, kind_of_design, kinds_there
 from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
-from analysis.logs.suspicions import copies, other_log, turned_round
-from analysis.logs.texts import Block, TextTable, joined, table_of_records, text_tables
+from analysis.logs.suspicions import turned_round
+from analysis.logs.texts import TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
 from experiments.record.tables import DataKind
-from experiments.study import register
 from experiments.study.folders import PlaceError
 from experiments.study.study import Member
 
@@ -52,10 +50,6 @@ _BATCH_BYTES = 4 << 20
 
 _BATCHES_AHEAD = 4
 """So many are read from disk while others are checked."""
-
-_ONSET = re.compile(rb"T\d\d:\d\d:\d\d\.\d{6}Z")
-_LOGS_A_FILE = 1 << 20
-"""Numbers of logs are so far apart from file to file: a mapped file may hold several."""
 
 Track = Callable[[Sequence[Path]], Iterable[Path]]
 
@@ -103,193 +97,6 @@ class Logs:
     apart: tuple[Logs, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Waiting:
-    """A file, its number, the folder that stands for its study, and its content, or why there is none."""
-
-    number: int
-    file: Path
-    path: str
-    study: str
-    content: bytes | BadLogError
-
-
-@dataclass(slots=True, kw_only=True)
-class _Batch:
-    """What is in some files: the rows of good logs, and by number each log, or what is wrong with it."""
-
-    blocks: list[Block] = field(default_factory=list)
-    logs: dict[int, Log | BadLogError] = field(default_factory=dict)
-    mapped: dict[int, MappedLog] = field(default_factory=dict)
-    """Logs of other programs."""
-    journals: dict[int, str | None] = field(default_factory=dict)
-    """Of logs of our own what there is to say of their journals, `None` where there is none."""
-    kinds: dict[int, DataKind | None] = field(default_factory=dict)
-    """Whose data each good log holds; None where nobody answered."""
-    told: dict[str, list[Told]] = field(default_factory=dict)
-    """What the rows of logs tell, by experiment: to see copies."""
-    doubts: dict[int, str] = field(default_factory=dict)
-    """What is wrong with the times of logs that keep every other rule."""
-
-    def take(self, block: Block, logs: Mapping[int, Log | BadLogError]) -> None:
-        """Take over checked rows, and how it is with each log."""
-        self.blocks.append(block)
-        self.logs |= logs
-        self.kinds |= dict(kinds_of(block))
-        self.doubts |= doubts_of_block(block)
-        if told := told_by_block(block):
-            self.told.setdefault(block.experiment, []).append(told)
-
-
-@dataclass(slots=True, kw_only=True)
-class _Reading:
-    """What was read so far. Logs are numbered in the order of their files."""
-
-    problems: list[Problem]
-    blocks: list[Block] = field(default_factory=list)
-    studies: dict[int, str] = field(default_factory=dict)
-    """The study's folder of each good log."""
-    codes: dict[int, str] = field(default_factory=dict)
-    experiments: dict[int, str] = field(default_factory=dict)
-    kinds: dict[int, DataKind | None] = field(default_factory=dict)
-    """Whose data each good log holds; None where nobody answered."""
-    earlier: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
-    """The logs of each study, experiment and code, upper and lower case alike."""
-    files: dict[int, Path] = field(default_factory=dict)
-    """The files of good logs, numbered."""
-    mapped: set[int] = field(default_factory=set)
-    """The numbers of the logs that other programs wrote."""
-    contents: dict[int, Path] = field(default_factory=dict)
-    """The file that first held each content."""
-    members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
-    """Who stands in the register of each results folder."""
-    remarks: list[Problem] = field(default_factory=list)
-    proven: dict[int, tuple[str, str, bool]] = field(default_factory=dict)
-    """Folder and code of each good log of our own, and whether it has a journal."""
-    told: dict[str, list[Told]] = field(default_factory=dict)
-    """What the rows of logs tell, by experiment."""
-
-    def add(self, waiting: Sequence[_Waiting], batch: _Batch) -> None:
-        """Take over the logs of some files."""
-        self.blocks += batch.blocks
-        self.kinds |= batch.kinds
-        self.mapped |= batch.mapped.keys()
-        for experiment, told in batch.told.items():
-            self.told.setdefault(experiment, []).extend(told)
-        files = {one.number: one for one in waiting}
-        for number, log in sorted(batch.logs.items()):
-            one, mapped = files[number // _LOGS_A_FILE], batch.mapped.get(number)
-            study = (mapped and mapped.study) or one.study
-            try:
-                if isinstance(log, BadLogError):
-                    raise log
-                self.doubt(one, log, batch.doubts.get(number, ""), proven=batch.journals.get(number) is not None)
-                self.admit(number, one, log, study)
-            except BadLogError as bad:
-                code = mapped.participant if mapped else code_in_name(one.path) or ""
-                experiment = mapped.experiment if mapped else experiment_in_name(one.path)
-                self.problems.append(bad.of(one.file, code, experiment, study))
-            else:
-                if number in batch.journals:
-                    self.note(number, one, log, batch.journals[number])
-
-    def doubt(self, one: _Waiting, log: Log, said: str, *, proven: bool) -> None:
-        """Doubtful times leave a log out by `BadLogError`, unless its journal has proven it."""
-        if said and not proven:
-            raise BadLogError(said)
-        if said:
-            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
-
-    def note(self, number: int, one: _Waiting, log: Log, said: str | None) -> None:
-        """What there is to say of the journal of a log that was admitted."""
-        self.proven[number] = one.study, log.code, said is not None
-        if said:
-            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
-
-    def admit(self, number: int, one: _Waiting, log: Log, study: str) -> None:
-        """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
-        results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
-        reason = self.known(results).get(log.code, Member(participant_id=log.code)).excluded
-        if reason is not None:
-            how = f"`recoil study DIR --readmit {log.code} --reason TEXT`"
-            said = f"participant {log.code} is excluded: {reason} ({how} readmits them)"
-            raise BadLogError(f"{said} (rule: {IN_REGISTER})")
-        self._check_new(study, log, number)
-        self._check_no_copy(one)
-        self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
-        self.files[number // _LOGS_A_FILE] = one.file
-
-    def known(self, results: str) -> Mapping[str, Member]:
-        """Who stands in the register of a results folder, as far as it can be read; what cannot is a problem."""
-        if results not in self.members:
-            found = register.read_register(Path(results))
-            if found.problem:
-                said = f"{found.problem.removeprefix(f'{found.path}: ')}; whom it excludes there is not known"
-                self.problems.append(Problem(file=found.path, line=None, column=None, message=said))
-            self.members[results] = found.members
-        return self.members[results]
-
-    def _check_new(self, study: str, log: Log, number: int) -> None:
-        earlier = self.earlier.setdefault((study, log.experiment, log.code.casefold()), [])
-        first = next((one for one in earlier if self._go_together(one, number)), None)
-        if first is not None:
-            there = self.codes[first]
-            name = f"participant {log.code!r}" if log.code == there else f"participant {log.code!r} (there {there!r})"
-            rule = "(rule: one log a participant and experiment, upper and lower case alike)"
-            message = f"{name} has a {log.experiment} log already in {self.files[first // _LOGS_A_FILE]} {rule}"
-            raise BadLogError(message, None, "participant_id")
-        earlier.append(number)
-
-    def _check_no_copy(self, one: _Waiting) -> None:
-        """`BadLogError`: the same table, with onsets to the µs, stood elsewhere, as in a copy of the folder."""
-        if not isinstance(one.content, bytes) or not _ONSET.search(one.content):
-            return
-        same = self.contents.setdefault(hash(one.content), one.file)
-        if same != one.file:
-            where = os.path.relpath(same, one.file.parent)
-            raise BadLogError(f"holds what {where} holds, byte for byte (rule: a run counts once); read one of both")
-
-    def leave_copies(self) -> None:
-        """Leave out the logs that hold what others hold."""
-        proven = {number for number, (_, _, has_journal) in self.proven.items() if has_journal}
-        for experiment, told in self.told.items():
-            mine = [number for number in self.studies if self.experiments[number] == experiment]
-            for number, said in copies(doubles(told, mine), proven, self._seen_from):
-                self._leave(number, said)
-
-    def _seen_from(self, number: int, other: int) -> str:
-        """What the person of a log is called in what is said of another."""
-        return other_log(self.codes[number], self.files[number // _LOGS_A_FILE], self.files[other // _LOGS_A_FILE])
-
-    def _leave(self, number: int, said: str) -> None:
-        """Leave out a log that was admitted."""
-        if number in self.studies:
-            file, study = self.files[number // _LOGS_A_FILE], self.studies.pop(number)
-            self.problems.append(BadLogError(said).of(file, self.codes[number], self.experiments[number], study))
-
-    def keep_out(self, first: DataKind) -> None:
-        """Leave out the logs of other kinds of data than the first that is there."""
-        for number in [*self.studies]:
-            kind = self.kinds[number] or first
-            if kind != first:
-                self._leave(number, kept_out(kind, first))
-
-    def runs_by_kind(self, runs: Iterable[RunFile], first: DataKind) -> Mapping[DataKind, list[RunFile]]:
-        """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first."""
-        kinds = {
-            (study, self.codes[number], self.experiments[number]): self.kinds[number] or first
-            for number, study in self.studies.items()
-        }
-        found: dict[DataKind, list[RunFile]] = {kind: [] for kind in get_args(DataKind)}
-        for run in runs:
-            found[kinds.get((run.study, run.participant, run.experiment), first)].append(run)
-        return found
-
-    def _go_together(self, one: int, other: int) -> bool:
-        """Whether two logs may come into one table; where nobody answered, a log goes with all."""
-        return self.kinds[one] == self.kinds[other] or None in (self.kinds[one], self.kinds[other])
-
-
 def read_logs(
     paths: Iterable[str | Path],
     track: Track = iter,
@@ -308,7 +115,7 @@ def read_logs(
     """
     endings = mapping.files_end_with if mapping else ()
     files = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
-    reading = _Reading(problems=list(files.problems))
+    reading = Reading(problems=list(files.problems))
     runs = [run for path, study in files.journals.items() if (run := run_file(path, study))]
     made, begun = _without_tables(reading, without_table(runs, files.logs))
     every = {**files.logs, **{run.path: run.study for run in runs if run.path in made}}
@@ -342,14 +149,14 @@ def read_logs(
 
 
 def _of_kind(
-    reading: _Reading, designs: dict[int, DesignLog], kind: DataKind, first: DataKind, told: MethodNames
+    reading: Reading, designs: dict[int, DesignLog], kind: DataKind, first: DataKind, told: MethodNames
 ) -> Logs:
     """The good logs of one kind of data; where nobody answered, they count as of the first."""
     mine = {number: study for number, study in reading.studies.items() if (reading.kinds[number] or first) == kind}
     names = study_names(folder for folder in set(mine.values()) if Path(folder).is_absolute())
     studies = {number: names.get(study, study) for number, study in mine.items()}
     by_design = _by_design(reading, {number: log for number, log in designs.items() if number in mine}, studies)
-    used = {number // _LOGS_A_FILE for number in mine}
+    used = {number // LOGS_A_FILE for number in mine}
     files = {number: file for number, file in reading.files.items() if number in used}
     trials, ratings = (joined(experiment, reading.blocks, studies) for experiment in tables.TABLES)
     methods = {str(method) for table in (trials, ratings) for method in table["method"].unique()}
@@ -370,7 +177,7 @@ def _by_place(problem: Problem) -> tuple[str, int, str, str]:
     return str(problem.file), problem.line or 0, problem.column or "", problem.message
 
 
-def _without_tables(reading: _Reading, runs: Sequence[RunFile]) -> tuple[dict[str, bytes], list[BegunRun]]:
+def _without_tables(reading: Reading, runs: Sequence[RunFile]) -> tuple[dict[str, bytes], list[BegunRun]]:
     """The tables of finished runs that lack one, by the paths of their journals; and the runs that are not finished."""
     made, begun = dict[str, bytes](), list[BegunRun]()
     for run in runs:
@@ -388,35 +195,35 @@ def _without_tables(reading: _Reading, runs: Sequence[RunFile]) -> tuple[dict[st
 
 
 def _designed(
-    reading: _Reading, found: Mapping[str, str], track: Track, first: int, made: Mapping[str, bytes]
+    reading: Reading, found: Mapping[str, str], track: Track, first: int, made: Mapping[str, bytes]
 ) -> dict[int, DesignLog]:
     """The good logs of designs, numbered behind the others."""
     logs: dict[int, DesignLog] = {}
     files = zip(found.items(), track([Path(path) for path in found]), strict=True) if found else ()
     for number, ((path, study), file) in enumerate(files, start=first):
-        waiting = _Waiting(number=number, file=file, path=path, study=study, content=made.get(path) or _content(path))
+        waiting = Waiting(number=number, file=file, path=path, study=study, content=made.get(path) or _content(path))
         try:
             log = read_design_log(path, waiting.content)
             of_design = Log(code=log.code, experiment=log.design.design)
-            reading.kinds[number * _LOGS_A_FILE] = kind_of_design(log)
-            reading.admit(number * _LOGS_A_FILE, waiting, of_design, study)
-            reading.note(number * _LOGS_A_FILE, waiting, of_design, log.journal)
+            reading.kinds[number * LOGS_A_FILE] = kind_of_design(log)
+            reading.admit(number * LOGS_A_FILE, waiting, of_design, study)
+            reading.note(number * LOGS_A_FILE, waiting, of_design, log.journal)
             reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
-            logs[number * _LOGS_A_FILE] = log
-            if told := told_by_design(number * _LOGS_A_FILE, log.design, log.rows):
+            logs[number * LOGS_A_FILE] = log
+            if told := told_by_design(number * LOGS_A_FILE, log.design, log.rows):
                 reading.told.setdefault(log.design.design, []).append(told)
         except BadLogError as bad:
             reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path), study))
     return logs
 
 
-def _by_design(reading: _Reading, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
+def _by_design(reading: Reading, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
     """The logs by design; one that was made with another design than most of its name is left out."""
     several = len(set(studies.values())) > 1
     found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], several=several)
     for number, log in logs.items():
         if log.key in others:
-            file = reading.files.pop(number // _LOGS_A_FILE)
+            file = reading.files.pop(number // LOGS_A_FILE)
             message = (
                 f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
                 "trial or questions differ); analyse it apart"
@@ -426,14 +233,14 @@ def _by_design(reading: _Reading, logs: Mapping[int, DesignLog], studies: Mappin
     return tuple(found)
 
 
-def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[_Waiting]]:
+def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[Waiting]]:
     """The files' contents, read in turn, but for tables that were `made` of journals."""
-    waiting: list[_Waiting] = []
+    waiting: list[Waiting] = []
     size = 0
     files = zip(found.items(), track([Path(path) for path in found]), strict=True)
     for number, ((path, study), file) in enumerate(files):
         content = made[path] if path in made else _content(path)
-        waiting.append(_Waiting(number=number, file=file, path=path, study=study, content=content))
+        waiting.append(Waiting(number=number, file=file, path=path, study=study, content=content))
         size += len(content) if isinstance(content, bytes) else 0
         if size >= _BATCH_BYTES:
             yield waiting
@@ -449,10 +256,10 @@ def _content(path: str) -> bytes | BadLogError:
 
 
 def _checked_batches(
-    batches: Iterable[list[_Waiting]], mapping: ColumnMap | None
-) -> Iterator[tuple[list[_Waiting], _Batch]]:
+    batches: Iterable[list[Waiting]], mapping: ColumnMap | None
+) -> Iterator[tuple[list[Waiting], Batch]]:
     """Each batch with what is in it; on all processors, for Arrow keeps none of them to itself."""
-    ahead: deque[tuple[list[_Waiting], Future[_Batch]]] = deque()
+    ahead: deque[tuple[list[Waiting], Future[Batch]]] = deque()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for waiting in batches:
             ahead.append((waiting, pool.submit(_checked, waiting, mapping)))
@@ -462,13 +269,13 @@ def _checked_batches(
         yield from ((waiting, batch.result()) for waiting, batch in ahead)
 
 
-def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
+def _checked(waiting: Sequence[Waiting], mapping: ColumnMap | None) -> Batch:
     """The logs of some files: one a file, but for files that are mapped."""
-    batch, tables = _Batch(), list[TextTable]()
+    batch, tables = Batch(), list[TextTable]()
     contents: dict[int, bytes] = {}
     names: dict[int, str | None] = {}
     for one in waiting:
-        number = one.number * _LOGS_A_FILE
+        number = one.number * LOGS_A_FILE
         try:
             if isinstance(one.content, BadLogError):
                 raise one.content
@@ -493,7 +300,7 @@ def _checked(waiting: Sequence[_Waiting], mapping: ColumnMap | None) -> _Batch:
     return batch
 
 
-def _mapped(batch: _Batch, first: int, logs: Sequence[MappedLog], mapping: ColumnMap) -> TextTable:
+def _mapped(batch: Batch, first: int, logs: Sequence[MappedLog], mapping: ColumnMap) -> TextTable:
     """The logs of a file that Recoil did not write, numbered from `first`, as far as they could be mapped."""
     records = {}
     for number, log in enumerate(logs, start=first):

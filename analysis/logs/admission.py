@@ -1,0 +1,220 @@
+"""What was read so far: whose logs are taken, whose are left out, and why."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import get_args
+
+from analysis.logs.column_map import MappedLog
+from analysis.logs.doubles import Told, doubles, told_by_block
+from analysis.logs.doubtful_times import doubts_of_block
+from analysis.logs.files import (
+    BadLogError,
+    Problem,
+    code_in_name,
+    experiment_in_name,
+)
+from analysis.logs.journals import RunFile
+from analysis.logs.kinds import IN_REGISTER, kept_out, kinds_of
+from analysis.logs.rules import Log
+from analysis.logs.suspicions import copies, other_log
+from analysis.logs.texts import Block
+from experiments.record.tables import DataKind
+from experiments.study import register
+from experiments.study.study import Member
+
+_ONSET = re.compile(rb"T\d\d:\d\d:\d\d\.\d{6}Z")
+"""An onset to the µs: no two runs have all the same."""
+LOGS_A_FILE = 1 << 20
+"""Numbers of logs are so far apart from file to file: a mapped file may hold several."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waiting:
+    """A file, its number, the folder that stands for its study, and its content, or why there is none."""
+
+    number: int
+    file: Path
+    path: str
+    study: str
+    content: bytes | BadLogError
+
+
+@dataclass(slots=True, kw_only=True)
+class Batch:
+    """What is in some files: the rows of good logs, and by number each log, or what is wrong with it."""
+
+    blocks: list[Block] = field(default_factory=list)
+    logs: dict[int, Log | BadLogError] = field(default_factory=dict)
+    mapped: dict[int, MappedLog] = field(default_factory=dict)
+    """Logs of other programs."""
+    journals: dict[int, str | None] = field(default_factory=dict)
+    """Of logs of our own what there is to say of their journals, `None` where there is none."""
+    kinds: dict[int, DataKind | None] = field(default_factory=dict)
+    """Whose data each good log holds; None where nobody answered."""
+    told: dict[str, list[Told]] = field(default_factory=dict)
+    """What the rows of logs tell, by experiment: to see copies."""
+    doubts: dict[int, str] = field(default_factory=dict)
+    """What is wrong with the times of logs that keep every other rule."""
+
+    def take(self, block: Block, logs: Mapping[int, Log | BadLogError]) -> None:
+        """Take over checked rows, and how it is with each log."""
+        self.blocks.append(block)
+        self.logs |= logs
+        self.kinds |= dict(kinds_of(block))
+        self.doubts |= doubts_of_block(block)
+        if told := told_by_block(block):
+            self.told.setdefault(block.experiment, []).append(told)
+
+
+@dataclass(slots=True, kw_only=True)
+class Reading:
+    """What was read so far. Logs are numbered in the order of their files."""
+
+    problems: list[Problem]
+    blocks: list[Block] = field(default_factory=list)
+    studies: dict[int, str] = field(default_factory=dict)
+    """The study's folder of each good log."""
+    codes: dict[int, str] = field(default_factory=dict)
+    experiments: dict[int, str] = field(default_factory=dict)
+    kinds: dict[int, DataKind | None] = field(default_factory=dict)
+    """Whose data each good log holds; None where nobody answered."""
+    earlier: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
+    """The logs of each study, experiment and code, upper and lower case alike."""
+    files: dict[int, Path] = field(default_factory=dict)
+    """The files of good logs, numbered."""
+    mapped: set[int] = field(default_factory=set)
+    """The numbers of the logs that other programs wrote."""
+    contents: dict[int, Path] = field(default_factory=dict)
+    """The file that first held each content."""
+    members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
+    """Who stands in the register of each results folder."""
+    remarks: list[Problem] = field(default_factory=list)
+    proven: dict[int, tuple[str, str, bool]] = field(default_factory=dict)
+    """Folder and code of each good log of our own, and whether it has a journal."""
+    told: dict[str, list[Told]] = field(default_factory=dict)
+    """What the rows of logs tell, by experiment."""
+
+    def add(self, waiting: Sequence[Waiting], batch: Batch) -> None:
+        """Take over the logs of some files."""
+        self.blocks += batch.blocks
+        self.kinds |= batch.kinds
+        self.mapped |= batch.mapped.keys()
+        for experiment, told in batch.told.items():
+            self.told.setdefault(experiment, []).extend(told)
+        files = {one.number: one for one in waiting}
+        for number, log in sorted(batch.logs.items()):
+            one, mapped = files[number // LOGS_A_FILE], batch.mapped.get(number)
+            study = (mapped and mapped.study) or one.study
+            try:
+                if isinstance(log, BadLogError):
+                    raise log
+                self.doubt(one, log, batch.doubts.get(number, ""), proven=batch.journals.get(number) is not None)
+                self.admit(number, one, log, study)
+            except BadLogError as bad:
+                code = mapped.participant if mapped else code_in_name(one.path) or ""
+                experiment = mapped.experiment if mapped else experiment_in_name(one.path)
+                self.problems.append(bad.of(one.file, code, experiment, study))
+            else:
+                if number in batch.journals:
+                    self.note(number, one, log, batch.journals[number])
+
+    def doubt(self, one: Waiting, log: Log, said: str, *, proven: bool) -> None:
+        """Doubtful times leave a log out by `BadLogError`, unless its journal has proven it."""
+        if said and not proven:
+            raise BadLogError(said)
+        if said:
+            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
+
+    def note(self, number: int, one: Waiting, log: Log, said: str | None) -> None:
+        """What there is to say of the journal of a log that was admitted."""
+        self.proven[number] = one.study, log.code, said is not None
+        if said:
+            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
+
+    def admit(self, number: int, one: Waiting, log: Log, study: str) -> None:
+        """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
+        results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
+        reason = self.known(results).get(log.code, Member(participant_id=log.code)).excluded
+        if reason is not None:
+            how = f"`recoil study DIR --readmit {log.code} --reason TEXT`"
+            said = f"participant {log.code} is excluded: {reason} ({how} readmits them)"
+            raise BadLogError(f"{said} (rule: {IN_REGISTER})")
+        self._check_new(study, log, number)
+        self._check_no_copy(one)
+        self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
+        self.files[number // LOGS_A_FILE] = one.file
+
+    def known(self, results: str) -> Mapping[str, Member]:
+        """Who stands in the register of a results folder, as far as it can be read; what cannot is a problem."""
+        if results not in self.members:
+            found = register.read_register(Path(results))
+            if found.problem:
+                said = f"{found.problem.removeprefix(f'{found.path}: ')}; whom it excludes there is not known"
+                self.problems.append(Problem(file=found.path, line=None, column=None, message=said))
+            self.members[results] = found.members
+        return self.members[results]
+
+    def _check_new(self, study: str, log: Log, number: int) -> None:
+        earlier = self.earlier.setdefault((study, log.experiment, log.code.casefold()), [])
+        first = next((one for one in earlier if self._go_together(one, number)), None)
+        if first is not None:
+            there = self.codes[first]
+            name = f"participant {log.code!r}" if log.code == there else f"participant {log.code!r} (there {there!r})"
+            rule = "(rule: one log a participant and experiment, upper and lower case alike)"
+            message = f"{name} has a {log.experiment} log already in {self.files[first // LOGS_A_FILE]} {rule}"
+            raise BadLogError(message, None, "participant_id")
+        earlier.append(number)
+
+    def _check_no_copy(self, one: Waiting) -> None:
+        """`BadLogError`: the same table, with onsets to the µs, stood elsewhere, as in a copy of the folder."""
+        if not isinstance(one.content, bytes) or not _ONSET.search(one.content):
+            return
+        same = self.contents.setdefault(hash(one.content), one.file)
+        if same != one.file:
+            where = os.path.relpath(same, one.file.parent)
+            raise BadLogError(f"holds what {where} holds, byte for byte (rule: a run counts once); read one of both")
+
+    def leave_copies(self) -> None:
+        """Leave out the logs that hold what others hold."""
+        proven = {number for number, (_, _, has_journal) in self.proven.items() if has_journal}
+        for experiment, told in self.told.items():
+            mine = [number for number in self.studies if self.experiments[number] == experiment]
+            for number, said in copies(doubles(told, mine), proven, self._seen_from):
+                self._leave(number, said)
+
+    def _seen_from(self, number: int, other: int) -> str:
+        """What the person of a log is called in what is said of another."""
+        return other_log(self.codes[number], self.files[number // LOGS_A_FILE], self.files[other // LOGS_A_FILE])
+
+    def _leave(self, number: int, said: str) -> None:
+        """Leave out a log that was admitted."""
+        if number in self.studies:
+            file, study = self.files[number // LOGS_A_FILE], self.studies.pop(number)
+            self.problems.append(BadLogError(said).of(file, self.codes[number], self.experiments[number], study))
+
+    def keep_out(self, first: DataKind) -> None:
+        """Leave out the logs of other kinds of data than the first that is there."""
+        for number in [*self.studies]:
+            kind = self.kinds[number] or first
+            if kind != first:
+                self._leave(number, kept_out(kind, first))
+
+    def runs_by_kind(self, runs: Iterable[RunFile], first: DataKind) -> Mapping[DataKind, list[RunFile]]:
+        """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first."""
+        kinds = {
+            (study, self.codes[number], self.experiments[number]): self.kinds[number] or first
+            for number, study in self.studies.items()
+        }
+        found: dict[DataKind, list[RunFile]] = {kind: [] for kind in get_args(DataKind)}
+        for run in runs:
+            found[kinds.get((run.study, run.participant, run.experiment), first)].append(run)
+        return found
+
+    def _go_together(self, one: int, other: int) -> bool:
+        """Whether two logs may come into one table; where nobody answered, a log goes with all."""
+        return self.kinds[one] == self.kinds[other] or None in (self.kinds[one], self.kinds[other])
