@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.logs.doubles import STRETCH, Double, Told, doubles
+from analysis.logs.doubles import STRETCH, Double, ToldRows, doubles
 
 ROWS = 60
 
 
-def told(number: int, answer: np.ndarray, time_ms: np.ndarray) -> Told:
+def told(number: int, answer: np.ndarray, time_ms: np.ndarray) -> ToldRows:
     """A log of as many rows, asked one of two things in turn."""
     asked = np.arange(len(answer), dtype=np.uint64) % np.uint64(2) + np.uint64(1)
-    return Told(
+    return ToldRows(
         number=np.array([number]),
         rows=np.array([len(answer)]),
         asked=asked,
@@ -24,13 +24,13 @@ def told(number: int, answer: np.ndarray, time_ms: np.ndarray) -> Told:
     )
 
 
-def person(number: int, seed: int) -> Told:
+def person(number: int, seed: int) -> ToldRows:
     """Somebody who is right in three of four trials, with times of half a second and more."""
     rng = np.random.default_rng(seed)
     return told(number, rng.random(ROWS) < 0.75, 500 + rng.gamma(2.0, 150.0, ROWS))
 
 
-def untimed(one: Told, number: int) -> Told:
+def untimed(one: ToldRows, number: int) -> ToldRows:
     return told(number, one.answer - np.uint64(1), np.full(ROWS, -1))
 
 
@@ -69,7 +69,7 @@ def test_a_log_that_is_written_several_times_over_is_found(often: int) -> None:
     one = person(0, 4)
     for written in (np.tile, np.repeat):
         cells = {name: written(getattr(one, name), often) for name in ("asked", "answer", "time_ms")}
-        (found,) = doubles([Told(number=one.number, rows=one.rows * often, **cells)], [0])
+        (found,) = doubles([ToldRows(number=one.number, rows=one.rows * often, **cells)], [0])
         assert (found.first, found.second) == (0, 0)
 
 

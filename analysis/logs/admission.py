@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import get_args
 
 from analysis.logs.column_map import MappedLog
-from analysis.logs.doubles import Told, doubles, told_by_block
+from analysis.logs.doubles import ToldRows, doubles, told_by_block
 from analysis.logs.doubtful_times import doubts_of_block
 from analysis.logs.files import (
     BadLogError,
@@ -34,7 +34,7 @@ LOGS_A_FILE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Waiting:
+class WaitingFile:
     """A file, its number, the folder that stands for its study, and its content, or why there is none."""
 
     number: int
@@ -56,7 +56,7 @@ class Batch:
     """Of logs of our own what there is to say of their journals, `None` where there is none."""
     kinds: dict[int, DataKind | None] = field(default_factory=dict)
     """Whose data each good log holds; None where nobody answered."""
-    told: dict[str, list[Told]] = field(default_factory=dict)
+    told: dict[str, list[ToldRows]] = field(default_factory=dict)
     """What the rows of logs tell, by experiment: to see copies."""
     doubts: dict[int, str] = field(default_factory=dict)
     """What is wrong with the times of logs that keep every other rule."""
@@ -72,7 +72,7 @@ class Batch:
 
 
 @dataclass(slots=True, kw_only=True)
-class Reading:
+class LogsSoFar:
     """What was read so far. Logs are numbered in the order of their files."""
 
     problems: list[Problem]
@@ -96,10 +96,10 @@ class Reading:
     remarks: list[Problem] = field(default_factory=list)
     proven: dict[int, tuple[str, str, bool]] = field(default_factory=dict)
     """Folder and code of each good log of our own, and whether it has a journal."""
-    told: dict[str, list[Told]] = field(default_factory=dict)
+    told: dict[str, list[ToldRows]] = field(default_factory=dict)
     """What the rows of logs tell, by experiment."""
 
-    def add(self, waiting: Sequence[Waiting], batch: Batch) -> None:
+    def add(self, waiting: Sequence[WaitingFile], batch: Batch) -> None:
         """Take over the logs of some files."""
         self.blocks += batch.blocks
         self.kinds |= batch.kinds
@@ -123,20 +123,20 @@ class Reading:
                 if number in batch.journals:
                     self.note(number, one, log, batch.journals[number])
 
-    def doubt(self, one: Waiting, log: Log, said: str, *, proven: bool) -> None:
+    def doubt(self, one: WaitingFile, log: Log, said: str, *, proven: bool) -> None:
         """Doubtful times leave a log out by `BadLogError`, unless its journal has proven it."""
         if said and not proven:
             raise BadLogError(said)
         if said:
             self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
-    def note(self, number: int, one: Waiting, log: Log, said: str | None) -> None:
+    def note(self, number: int, one: WaitingFile, log: Log, said: str | None) -> None:
         """What there is to say of the journal of a log that was admitted."""
         self.proven[number] = one.study, log.code, said is not None
         if said:
             self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
-    def admit(self, number: int, one: Waiting, log: Log, study: str) -> None:
+    def admit(self, number: int, one: WaitingFile, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
         results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
         reason = self.known(results).get(log.code, Member(participant_id=log.code)).excluded
@@ -170,7 +170,7 @@ class Reading:
             raise BadLogError(message, None, "participant_id")
         earlier.append(number)
 
-    def _check_no_copy(self, one: Waiting) -> None:
+    def _check_no_copy(self, one: WaitingFile) -> None:
         """`BadLogError`: the same table, with onsets to the µs, stood elsewhere, as in a copy of the folder."""
         if not isinstance(one.content, bytes) or not _ONSET.search(one.content):
             return

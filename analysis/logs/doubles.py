@@ -36,7 +36,7 @@ _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Told:
+class ToldRows:
     """What rows of logs tell, log after log: the logs' `number` and how many `rows` each has.
 
     `asked` and `answer` are the same number for the same; an answer of 0 is none, and `time_ms` -1.
@@ -74,7 +74,7 @@ class Double:
     at: tuple[int, int] = (1, 1)
 
 
-def told_by_block(block: Block) -> Told | None:
+def told_by_block(block: Block) -> ToldRows | None:
     """What the rows of trials tell; `None` of ratings, which are too few to tell copies from chance."""
     measure = MEASURES[block.experiment]
     if "response_time_s" not in block.columns or not len(block.log):
@@ -84,17 +84,17 @@ def told_by_block(block: Block) -> Told | None:
         asked = asked * _MIX[0] + _hashed(block.columns[name])
     time_s = np.asarray(block.columns["response_time_s"], dtype=np.float64)
     answer = _hashed(block.columns[measure.answer])
-    return Told(number=block.log, rows=block.rows, asked=asked, answer=answer, time_ms=_ms(time_s))
+    return ToldRows(number=block.log, rows=block.rows, asked=asked, answer=answer, time_ms=_ms(time_s))
 
 
-def told_by_design(number: int, design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> Told | None:
+def told_by_design(number: int, design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> ToldRows | None:
     """The same of a design's log; `None` where no question has a time."""
     timed = [name for name, question in design.questions.items() if question.named_answers]
     if not timed or not rows:
         return None
     factors = [name for name in rows[0] if name in design.factors]
     times = [row[f"{timed[0]}_time_s"] for row in rows]
-    return Told(
+    return ToldRows(
         number=np.array([number]),
         rows=np.array([len(rows)]),
         asked=np.array([_hash(repr([row[name] for name in factors])) for row in rows], dtype=np.uint64),
@@ -119,7 +119,7 @@ def _hash(text: str) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest())
 
 
-def doubles(some: Iterable[Told], numbers: Iterable[int]) -> list[Double]:
+def doubles(some: Iterable[ToldRows], numbers: Iterable[int]) -> list[Double]:
     """The doubles among logs of one experiment with these numbers; each log once, with the first that it is like."""
     told = _chosen([*some], set(numbers))
     if told is None:
@@ -130,7 +130,7 @@ def doubles(some: Iterable[Told], numbers: Iterable[int]) -> list[Double]:
     return [found[number] for number in sorted(found)]
 
 
-def _chosen(some: Sequence[Told], numbers: set[int]) -> Told | None:
+def _chosen(some: Sequence[ToldRows], numbers: set[int]) -> ToldRows | None:
     """All these logs together, in the order of their numbers."""
     if not some:
         return None
@@ -141,10 +141,10 @@ def _chosen(some: Sequence[Told], numbers: set[int]) -> Told | None:
         return None
     at = np.concatenate([np.arange(first[one], first[one] + rows[one]) for one in order.tolist()])
     cells = {name: np.concatenate([getattr(one, name) for one in some])[at] for name in ("asked", "answer", "time_ms")}
-    return Told(number=number[order], rows=rows[order], **cells)
+    return ToldRows(number=number[order], rows=rows[order], **cells)
 
 
-def _surprise(told: Told, rows: slice, copied: slice) -> float:
+def _surprise(told: ToldRows, rows: slice, copied: slice) -> float:
     """How much `copied` rows surprise in nats, by what all `rows` of their log hold."""
     within = slice(copied.start - rows.start, copied.stop - rows.start)
     answers = _of_answers(told.asked[rows], told.answer[rows])
@@ -179,16 +179,16 @@ def _count(values: Hashes | NDArray[np.int64]) -> FloatArray:
     return counts[places].astype(np.float64)
 
 
-def _is_rare(told: Told, rows: slice, copied: slice) -> bool:
+def _is_rare(told: ToldRows, rows: slice, copied: slice) -> bool:
     return _surprise(told, rows, copied) > math.log(ODDS)
 
 
-def _slices(told: Told) -> list[slice]:
+def _slices(told: ToldRows) -> list[slice]:
     ends = np.cumsum(told.rows).tolist()
     return [slice(end - count, end) for end, count in zip(ends, told.rows.tolist(), strict=True)]
 
 
-def _written_often(told: Told) -> Iterator[Double]:
+def _written_often(told: ToldRows) -> Iterator[Double]:
     """Logs that are one block several times over, or each row; those in the same way are judged together."""
     by_way: dict[tuple[int, bool], list[tuple[float, Double]]] = {}
     row = told.row
@@ -218,11 +218,11 @@ def _way(row: Hashes) -> tuple[int, bool] | None:
     return None
 
 
-def _timed(told: Told, rows: slice) -> bool:
+def _timed(told: ToldRows, rows: slice) -> bool:
     return bool((told.time_ms[rows] >= 0).any())
 
 
-def _alike(told: Told) -> Iterator[Double]:
+def _alike(told: ToldRows) -> Iterator[Double]:
     """Whole logs that are the same."""
     row, first = told.row, dict[bytes, int]()
     slices = _slices(told)
@@ -233,7 +233,7 @@ def _alike(told: Told) -> Iterator[Double]:
             yield Double(first=one, second=other, whole=True, timed=_timed(told, rows))
 
 
-def _stretches(told: Told) -> Iterator[Double]:
+def _stretches(told: ToldRows) -> Iterator[Double]:
     """Stretches of rows with times that stand anywhere else as well."""
     starts, hashes = _windows(told)
     order = np.argsort(hashes, kind="stable")
@@ -253,7 +253,7 @@ def _stretches(told: Told) -> Iterator[Double]:
             )
 
 
-def _windows(told: Told) -> tuple[NDArray[np.intp], Hashes]:
+def _windows(told: ToldRows) -> tuple[NDArray[np.intp], Hashes]:
     """Where stretches of answered rows with times begin, and a number for what each tells."""
     full: BoolArray = (told.time_ms >= 0) & (told.answer != 0)
     count = len(full) - STRETCH + 1

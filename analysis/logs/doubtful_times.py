@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, as_moment, onset_moments
+from analysis.logs.rules import Integers
 from analysis.logs.texts import Block, Coded
 from analysis.stats.arrays import BoolArray, FloatArray
 from experiments.design.config import DesignConfig
@@ -25,8 +25,6 @@ AHEAD = timedelta(days=366)
 """So far ahead of this computer's clock another may be."""
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SECOND = 1_000_000
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -145,7 +143,7 @@ def _overlapping(times: LogTimes) -> Iterator[tuple[int, str]]:
         yield place, f"a response time is {time:g} s after {begun}, and the next onset {gap_s[at]:g} s after it {rule}"
 
 
-def _first_of_each(logs: Integers, rows: NDArray[np.intp]) -> tuple[list[int], list[int]]:
+def _first_of_each(logs: Integers, rows: Integers) -> tuple[list[int], list[int]]:
     """Logs, each once, and the first row of each."""
     places, firsts = np.unique(logs, return_index=True)
     return places.tolist(), rows[firsts].tolist()

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.logs.admission import LOGS_A_FILE, Batch, Reading, Waiting
+from analysis.logs.admission import LOGS_A_FILE, Batch, LogsSoFar, WaitingFile
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
 from analysis.logs.doubles import told_by_design
@@ -115,7 +115,7 @@ def read_logs(
     """
     endings = mapping.files_end_with if mapping else ()
     files = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
-    reading = Reading(problems=list(files.problems))
+    reading = LogsSoFar(problems=list(files.problems))
     runs = [run for path, study in files.journals.items() if (run := run_file(path, study))]
     made, begun = _without_tables(reading, without_table(runs, files.logs))
     every = {**files.logs, **{run.path: run.study for run in runs if run.path in made}}
@@ -149,7 +149,7 @@ def read_logs(
 
 
 def _of_kind(
-    reading: Reading, designs: dict[int, DesignLog], kind: DataKind, first: DataKind, told: MethodNames
+    reading: LogsSoFar, designs: dict[int, DesignLog], kind: DataKind, first: DataKind, told: MethodNames
 ) -> Logs:
     """The good logs of one kind of data; where nobody answered, they count as of the first."""
     mine = {number: study for number, study in reading.studies.items() if (reading.kinds[number] or first) == kind}
@@ -177,7 +177,7 @@ def _by_place(problem: Problem) -> tuple[str, int, str, str]:
     return str(problem.file), problem.line or 0, problem.column or "", problem.message
 
 
-def _without_tables(reading: Reading, runs: Sequence[RunFile]) -> tuple[dict[str, bytes], list[BegunRun]]:
+def _without_tables(reading: LogsSoFar, runs: Sequence[RunFile]) -> tuple[dict[str, bytes], list[BegunRun]]:
     """The tables of finished runs that lack one, by the paths of their journals; and the runs that are not finished."""
     made, begun = dict[str, bytes](), list[BegunRun]()
     for run in runs:
@@ -195,13 +195,15 @@ def _without_tables(reading: Reading, runs: Sequence[RunFile]) -> tuple[dict[str
 
 
 def _designed(
-    reading: Reading, found: Mapping[str, str], track: Track, first: int, made: Mapping[str, bytes]
+    reading: LogsSoFar, found: Mapping[str, str], track: Track, first: int, made: Mapping[str, bytes]
 ) -> dict[int, DesignLog]:
     """The good logs of designs, numbered behind the others."""
     logs: dict[int, DesignLog] = {}
     files = zip(found.items(), track([Path(path) for path in found]), strict=True) if found else ()
     for number, ((path, study), file) in enumerate(files, start=first):
-        waiting = Waiting(number=number, file=file, path=path, study=study, content=made.get(path) or _content(path))
+        waiting = WaitingFile(
+            number=number, file=file, path=path, study=study, content=made.get(path) or _content(path)
+        )
         try:
             log = read_design_log(path, waiting.content)
             of_design = Log(code=log.code, experiment=log.design.design)
@@ -217,7 +219,7 @@ def _designed(
     return logs
 
 
-def _by_design(reading: Reading, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
+def _by_design(reading: LogsSoFar, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
     """The logs by design; one that was made with another design than most of its name is left out."""
     several = len(set(studies.values())) > 1
     found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], several=several)
@@ -233,14 +235,14 @@ def _by_design(reading: Reading, logs: Mapping[int, DesignLog], studies: Mapping
     return tuple(found)
 
 
-def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[Waiting]]:
+def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[WaitingFile]]:
     """The files' contents, read in turn, but for tables that were `made` of journals."""
-    waiting: list[Waiting] = []
+    waiting: list[WaitingFile] = []
     size = 0
     files = zip(found.items(), track([Path(path) for path in found]), strict=True)
     for number, ((path, study), file) in enumerate(files):
         content = made[path] if path in made else _content(path)
-        waiting.append(Waiting(number=number, file=file, path=path, study=study, content=content))
+        waiting.append(WaitingFile(number=number, file=file, path=path, study=study, content=content))
         size += len(content) if isinstance(content, bytes) else 0
         if size >= _BATCH_BYTES:
             yield waiting
@@ -256,10 +258,10 @@ def _content(path: str) -> bytes | BadLogError:
 
 
 def _checked_batches(
-    batches: Iterable[list[Waiting]], mapping: ColumnMap | None
-) -> Iterator[tuple[list[Waiting], Batch]]:
+    batches: Iterable[list[WaitingFile]], mapping: ColumnMap | None
+) -> Iterator[tuple[list[WaitingFile], Batch]]:
     """Each batch with what is in it; on all processors, for Arrow keeps none of them to itself."""
-    ahead: deque[tuple[list[Waiting], Future[Batch]]] = deque()
+    ahead: deque[tuple[list[WaitingFile], Future[Batch]]] = deque()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for waiting in batches:
             ahead.append((waiting, pool.submit(_checked, waiting, mapping)))
@@ -269,7 +271,7 @@ def _checked_batches(
         yield from ((waiting, batch.result()) for waiting, batch in ahead)
 
 
-def _checked(waiting: Sequence[Waiting], mapping: ColumnMap | None) -> Batch:
+def _checked(waiting: Sequence[WaitingFile], mapping: ColumnMap | None) -> Batch:
     """The logs of some files: one a file, but for files that are mapped."""
     batch, tables = Batch(), list[TextTable]()
     contents: dict[int, bytes] = {}

@@ -13,11 +13,11 @@ from analysis.logs.doubles import ODDS, STRETCH, Double
 from analysis.logs.files import Problem
 from analysis.stats.binomial import binomial_test_p
 
-Named = Callable[[int, int], str]
+PersonCalled = Callable[[int, int], str]
 """What the person of a log is called in what is said of another log, by both numbers."""
 
 
-def copies(doubles: Iterable[Double], proven: Collection[int], named: Named) -> Iterator[tuple[int, str]]:
+def copies(doubles: Iterable[Double], proven: Collection[int], named: PersonCalled) -> Iterator[tuple[int, str]]:
     """The logs to leave out, each with what is said of it.
 
     Of two that are alike from end to end one stays: the one that a journal proves, else the first. Where a part was
