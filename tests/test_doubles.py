@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.logs.doubles import STRETCH, Double, ToldRows, doubles
+from analysis.logs.doubles import STRETCH, Double, ToldRows, doubles_among
 
 ROWS = 60
 
@@ -38,8 +38,8 @@ def untimed(one: ToldRows, number: int) -> ToldRows:
 @given(seed=st.integers(0, 2**32))
 def test_people_who_answer_by_themselves_are_no_doubles(seed: int) -> None:
     some = [person(number, seed + number) for number in range(8)]
-    assert doubles(some, range(8)) == []
-    assert doubles([untimed(one, number) for number, one in enumerate(some)], range(8)) == []
+    assert doubles_among(some, range(8)) == []
+    assert doubles_among([untimed(one, number) for number, one in enumerate(some)], range(8)) == []
 
 
 @settings(max_examples=20, deadline=None)
@@ -49,7 +49,7 @@ def test_a_stretch_of_rows_is_found_wherever_it_was_copied_to(seed: int, here: i
     there = there // 2 * 2 + here % 2  # what was asked is copied as well
     for name in ("answer", "time_ms"):
         getattr(other, name)[there : there + count] = getattr(one, name)[here : here + count]
-    (found,) = doubles([one, other], [3, 5])
+    (found,) = doubles_among([one, other], [3, 5])
     assert (found.first, found.second, found.whole, found.timed) == (3, 5, False, True)
     assert found.at == (here + 1, there + 1)
 
@@ -57,11 +57,11 @@ def test_a_stretch_of_rows_is_found_wherever_it_was_copied_to(seed: int, here: i
 def test_a_whole_log_is_found_without_times_and_of_several_each_once() -> None:
     one = person(0, 1)
     some = [untimed(one, number) for number in (0, 1, 2)]
-    assert doubles(some, [0, 1, 2]) == [Double(first=0, second=n, whole=True, timed=False) for n in (1, 2)]
+    assert doubles_among(some, [0, 1, 2]) == [Double(first=0, second=n, whole=True, timed=False) for n in (1, 2)]
 
 
 def test_logs_that_are_not_asked_for_are_not_looked_at() -> None:
-    assert doubles([untimed(person(0, 1), number) for number in (0, 1)], [1]) == []
+    assert doubles_among([untimed(person(0, 1), number) for number in (0, 1)], [1]) == []
 
 
 @pytest.mark.parametrize("often", [2, 3, 5, 6])
@@ -69,16 +69,16 @@ def test_a_log_that_is_written_several_times_over_is_found(often: int) -> None:
     one = person(0, 4)
     for written in (np.tile, np.repeat):
         cells = {name: written(getattr(one, name), often) for name in ("asked", "answer", "time_ms")}
-        (found,) = doubles([ToldRows(number=one.number, rows=one.rows * often, **cells)], [0])
+        (found,) = doubles_among([ToldRows(number=one.number, rows=one.rows * often, **cells)], [0])
         assert (found.first, found.second) == (0, 0)
 
 
 def test_people_who_are_always_right_agree_without_being_copies() -> None:
     right = np.arange(ROWS) % 2
-    assert doubles([told(number, right, np.full(ROWS, -1)) for number in (0, 1)], [0, 1]) == []
+    assert doubles_among([told(number, right, np.full(ROWS, -1)) for number in (0, 1)], [0, 1]) == []
 
 
 def test_made_logs_with_times_in_equal_steps_are_no_copies() -> None:
     first_right = np.arange(ROWS) < 40
     times = 500 + 10 * np.arange(ROWS)
-    assert doubles([told(number, first_right, times) for number in (0, 1)], [0, 1]) == []
+    assert doubles_among([told(number, first_right, times) for number in (0, 1)], [0, 1]) == []

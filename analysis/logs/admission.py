@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import get_args
 
 from analysis.logs.column_map import MappedLog
-from analysis.logs.doubles import ToldRows, doubles, told_by_block
+from analysis.logs.doubles import ToldRows, doubles_among, told_by_block
 from analysis.logs.doubtful_times import doubts_of_block
 from analysis.logs.files import (
     BadLogError,
@@ -184,7 +184,7 @@ class LogsSoFar:
         proven = {number for number, (_, _, has_journal) in self.proven.items() if has_journal}
         for experiment, told in self.told.items():
             mine = [number for number in self.studies if self.experiments[number] == experiment]
-            for number, said in copies(doubles(told, mine), proven, self._seen_from):
+            for number, said in copies(doubles_among(told, mine), proven, self._seen_from):
                 self._leave(number, said)
 
     def _seen_from(self, number: int, other: int) -> str:

@@ -31,7 +31,7 @@ ODDS = 1e9
 _OFTEN = (2, 3, 5, 7)
 """So many times over a log may be written; four times is twice two times."""
 
-Hashes = NDArray[np.uint64]
+_Hashes = NDArray[np.uint64]
 _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 
 
@@ -44,14 +44,14 @@ class ToldRows:
 
     number: NDArray[np.int64]
     rows: NDArray[np.int64]
-    asked: Hashes
-    answer: Hashes
+    asked: _Hashes
+    answer: _Hashes
     time_ms: NDArray[np.int64]
 
     @property
-    def row(self) -> Hashes:
+    def row(self) -> _Hashes:
         """A number for each row: the same for the same."""
-        found: Hashes = self.asked * _MIX[0] + self.answer * _MIX[1] + self.time_ms.astype(np.uint64) * _MIX[2]
+        found: _Hashes = self.asked * _MIX[0] + self.answer * _MIX[1] + self.time_ms.astype(np.uint64) * _MIX[2]
         return found
 
     @property
@@ -107,7 +107,7 @@ def _ms(time_s: FloatArray) -> NDArray[np.int64]:
     return np.where(np.isnan(time_s), -1.0, np.rint(time_s * 1000.0)).astype(np.int64)
 
 
-def _hashed(column: object) -> Hashes:
+def _hashed(column: object) -> _Hashes:
     if not isinstance(column, Coded):
         raise TypeError("a column of few values is asked for")
     values = [0 if value is None else _hash(str(value)) for value in column.values]
@@ -119,7 +119,7 @@ def _hash(text: str) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest())
 
 
-def doubles(some: Iterable[ToldRows], numbers: Iterable[int]) -> list[Double]:
+def doubles_among(some: Iterable[ToldRows], numbers: Iterable[int]) -> list[Double]:
     """The doubles among logs of one experiment with these numbers; each log once, with the first that it is like."""
     told = _chosen([*some], set(numbers))
     if told is None:
@@ -152,7 +152,7 @@ def _surprise(told: ToldRows, rows: slice, copied: slice) -> float:
     return sum(min(float(nats[within].sum()) for nats in ways) for ways in (answers, times))
 
 
-def _of_answers(asked: Hashes, answer: Hashes) -> tuple[FloatArray, FloatArray]:
+def _of_answers(asked: _Hashes, answer: _Hashes) -> tuple[FloatArray, FloatArray]:
     """The surprise of each answer among those to the same question, and among those after the same answer to it."""
     plain = -np.log(_count(asked * _MIX[0] + answer * _MIX[1]) / _count(asked))
     order = np.argsort(asked, kind="stable")
@@ -173,7 +173,7 @@ def _of_times(time_ms: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
     return plain, step
 
 
-def _count(values: Hashes | NDArray[np.int64]) -> FloatArray:
+def _count(values: _Hashes | NDArray[np.int64]) -> FloatArray:
     """How often each value is there."""
     _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
     return counts[places].astype(np.float64)
@@ -207,7 +207,7 @@ def _written_often(told: ToldRows) -> Iterator[Double]:
             yield from (double for _, double in some)
 
 
-def _way(row: Hashes) -> tuple[int, bool] | None:
+def _way(row: _Hashes) -> tuple[int, bool] | None:
     """How often a log is written over, and whether block after block or each row; `None` if once."""
     for often in (one for one in _OFTEN if len(row) % one == 0):
         part = len(row) // often
@@ -253,7 +253,7 @@ def _stretches(told: ToldRows) -> Iterator[Double]:
             )
 
 
-def _windows(told: ToldRows) -> tuple[NDArray[np.intp], Hashes]:
+def _windows(told: ToldRows) -> tuple[NDArray[np.intp], _Hashes]:
     """Where stretches of answered rows with times begin, and a number for what each tells."""
     full: BoolArray = (told.time_ms >= 0) & (told.answer != 0)
     count = len(full) - STRETCH + 1
