@@ -209,7 +209,8 @@ def test_response_times_say_how_many_and_cut_a_single_slow_one(statistics: Study
     slow = replace(one, percentiles=(*one.percentiles[:100], 41.3))
     times = replace(times, methods={**times.methods, "vibration": slow})
     found = replace(statistics.direction, response_times=times)
-    _, svg, _ = files_of(figure_response_times, found, tmp_path / "times")
+    with figure_files.drawn("svg"):
+        _, svg, _ = files_of(figure_response_times, found, tmp_path / "times")
     text = svg.read_text(encoding="utf-8")
     for words in ("n = 60 / 60", "Vibration (n = 120)", "the slowest took 41.3 s"):
         assert words in text

@@ -148,15 +148,15 @@ def after(trials: list[tuple[int, bool]]) -> posterior.Shares:
 
 
 def by_hand(trials: list[tuple[int, bool]]) -> np.ndarray:
-    """The posterior by its definition, one node after the other."""
+    """The posterior by its definition, trial by trial over all nodes."""
+    threshold, width, lapse, guess = np.meshgrid(
+        KNOWN.thresholds, KNOWN.widths, KNOWN.lapses, KNOWN.guesses, indexing="ij"
+    )
     weights = KNOWN.prior.copy()
-    for place in np.ndindex(weights.shape):
-        threshold, width = KNOWN.thresholds[place[0]], KNOWN.widths[place[1]]
-        lapse, guess = KNOWN.lapses[place[2]], KNOWN.guesses[place[3]]
-        for stimulus, right in trials:
-            felt = norm.cdf((KNOWN.stimuli[stimulus] - threshold) / width * 2 * norm.ppf(0.95))
-            share = guess + (1 - guess - lapse) * felt
-            weights[place] *= share if right else 1 - share
+    for stimulus, right in trials:
+        felt = norm.cdf((KNOWN.stimuli[stimulus] - threshold) / width * 2 * norm.ppf(0.95))
+        share = guess + (1 - guess - lapse) * felt
+        weights *= share if right else 1 - share
     return weights / weights.sum()
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import choix
 import numpy as np
 
 
 def main() -> None:
     """Fifty designs of three to eight items, each pair compared three to eleven times; those that have scores."""
+    import choix
+
     draws, cases = np.random.default_rng(0), []
     for _ in range(50):
         n = int(draws.integers(3, 9))

@@ -7,7 +7,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import psignifit
 from scipy.stats import norm
 
 NAMES = {"threshold": "threshold", "width": "width", "lambda": "lapse", "gamma": "guess", "eta": "overdispersion"}
@@ -15,6 +14,8 @@ NAMES = {"threshold": "threshold", "width": "width", "lambda": "lapse", "gamma":
 
 def main() -> None:
     """Nine levels of 20 trials, a cumulative normal of sd 2, a lapse rate of 0.02."""
+    import psignifit
+
     draws, cases = np.random.default_rng(0), []
     for number in range(4):
         levels, kind = np.linspace(-4, 4, 9), ("2AFC", "yes/no")[number % 2]
