@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from analysis.logs.exclusions import Rules, TrialRules
-from analysis.summary.planned_tests import sentences_of_tests
+from analysis.summary.announced import sentences_of_tests
 from analysis.summary.requests import AnyRequest
 from experiments.config.door import EligibilityConfig, StudyConfig
 from experiments.config.setup import Setup
