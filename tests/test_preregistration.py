@@ -13,9 +13,9 @@ import pytest
 from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
+from analysis.summary.announced import names_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
-from analysis.summary.announced import names_of_tests
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.preregistration import deviations_sections
