@@ -71,6 +71,7 @@ _MIDDLE: dict[State, type[Event]] = {
     S.PREPARING: events.Fire,
     S.TRAIN: events.Next,
     S.PAUSED: events.GoOn,
+    S.INFORMING: events.Told,
     S.CLOSING: events.Finish,
 }
 """The buttons in Fire's place that do something at a click."""
@@ -128,6 +129,9 @@ class Cell:
         self.experiment = experiment or ("preference" if state in IN_PREFERENCE else "direction")
         self.journal = folder / f"{STEM}{self.experiment}_journal.jsonl"
         configs = short_configs(folder)
+        if state is S.INFORMING:
+            config = configs / f"{self.experiment}.toml"
+            config.write_text(f'{config.read_text()}\n[[opening]]\ntext = "The gun shoots once."\n')
         self._words = words(configs, self.experiment, *more)
         self.watch = Watch(str(folder), hangs=(2,) if state is S.FIRING else ())
 
@@ -198,7 +202,7 @@ class Happened:
 
 def fire_place(screen: AtConsole) -> tuple[int, int]:
     """Where Fire's button is, whatever stands there now: where it was seen, or another of its place, or beside it."""
-    for name, right in (("fire", 0), ("rearm", 0), ("damper", 1)):
+    for name, right in (("fire", 0), ("rearm", 0), ("damper", 1), ("enter", 0)):
         looks = [look for look in screen.watch.looks() if name in look.places]
         if looks:
             x_px, y_px = middle(looks[-1], name)
