@@ -8,6 +8,7 @@ import os
 import random
 import re
 import shutil
+import tomllib
 from collections.abc import Callable
 from dataclasses import fields
 from datetime import UTC, datetime
@@ -18,7 +19,7 @@ import pytest
 
 from analysis.archive import archive_export, manifest, placing
 from analysis.archive.archive_export import Archived, ArchiveRequest
-from analysis.archive.redaction import FIRST_MOMENT, REDACTED, moment_of, redacted
+from analysis.archive.redaction import FIRST_MOMENT, REDACTED, moment_of, redacted, redacted_config
 from analysis.archive.verify import verify
 from experiments.record.journal import contents_of, ending_of, read_journal
 from experiments.session import remarks, steps
@@ -182,6 +183,16 @@ def test_free_text_stays_where_it_is_asked_for_but_causes_of_faults_never(
     told = redacted(path, path.read_bytes(), moment_of(raw(path)[0]["utc"]), free_text=True).decode()
     assert f"{NAME} came in" in told
     assert SECRET_PLACES[0] not in told
+
+
+def test_rules_say_neither_in_a_comment_nor_in_a_reason_who_someone_is(tmp_path: Path) -> None:
+    file = tmp_path / "rules.toml"
+    person = f'[[excluded]]\ncode = "P02"\nreason = "{NAME} fell ill"  # {NAME}\n'
+    file.write_text(f"# {NAME} wrote this\n[trials]\nresponse_time_min_s = 0.2\n{person}")
+    before, after = tomllib.loads(file.read_text()), redacted_config(file).decode()
+    assert NAME not in after
+    before["excluded"][0]["reason"] = REDACTED
+    assert tomllib.loads(after) == before
 
 
 def test_the_clocks_of_computer_and_gun_begin_anew_in_each_stretch_of_a_run(made: tuple[Path, Path, Archived]) -> None:

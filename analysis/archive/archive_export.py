@@ -196,7 +196,8 @@ def _write_analysis(
 ) -> None:
     for given, path in ((request.rules, RULES_FILE), (request.requests, REQUESTS_FILE)):
         if given is not None:
-            placing.write_file(part, path, given.read_bytes())
+            data = given.read_bytes() if request.free_text else redaction.redacted_config(given)
+            placing.write_file(part, path, data)
     placing.write_file(part, SETTINGS, as_json(settings))
     analyze(replace(analysis_of(part, settings), extra=(left_out,)), progress=progress)
 

@@ -16,7 +16,9 @@ from pathlib import Path
 
 from analysis.archive.bids import OLDEST_AGE
 from experiments.clock import utc_text
+from experiments.config.door import read_toml
 from experiments.config.setup import canonical_json, sha256
+from experiments.config.toml_text import toml_text
 from experiments.design.config import DesignConfig
 from experiments.rebuild import began_with, table
 from experiments.record.journal import JournalError, contents_of, link_of, parsed_line, record_line
@@ -187,6 +189,18 @@ def redacted_register(members: Iterable[Member]) -> bytes:
         written.append(line)
         link = link_of(line)
     return b"".join(written)
+
+
+def redacted_config(path: Path) -> bytes:
+    """A file of rules or requests as it is published: its values without comments, reasons of exclusions hidden."""
+    values = read_toml(path)
+    return toml_text({key: _without_reasons(one) for key, one in values.items()}).encode()
+
+
+def _without_reasons(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: REDACTED if key == "reason" else _without_reasons(one) for key, one in value.items()}
+    return [_without_reasons(one) for one in value] if isinstance(value, list) else value
 
 
 def _without_places(value: object, key: str = "") -> object:
