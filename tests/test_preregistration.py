@@ -10,6 +10,7 @@ from shutil import copytree
 
 import pytest
 
+from analysis.archive.making import preregistration_faults
 from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
@@ -412,6 +413,22 @@ def test_a_forger_who_makes_a_new_hash_is_found_by_the_journals_and_by_the_amend
     assert second.previous == first.sha256
     assert any("is not the preregistration that preregistration-2.json amends" in one for one in problems)
     assert any(f"no preregistration {first.short} that can be trusted" in one and "P01" in one for one in problems)
+
+
+def test_a_freeze_in_an_archive_is_held_against_the_journals_there(begun: Path) -> None:
+    place = begun / "preregistration"
+    place.mkdir()
+    assert ["the journals of P01 name" in one for one in preregistration_faults(begun)] == [True]
+    for path in begun.glob("preregistration-*"):
+        path.rename(place / path.name)
+    assert preregistration_faults(begun) == []
+    forged(place / "preregistration-1.json", "value")
+    assert preregistration_faults(begun)[0].startswith("preregistration/preregistration-1.json: was edited")
+
+
+def test_a_freeze_that_was_renamed_is_named_so(frozen: Path) -> None:
+    (frozen / "preregistration-1.json").rename(frozen / "preregistration-7.json")
+    assert any("preregistration-7.json: was renamed" in one for one in freeze_status(frozen).problems)
 
 
 def test_a_freeze_that_is_gone_is_named_and_not_written_anew(begun: Path) -> None:

@@ -12,6 +12,7 @@ from analysis.archive.datapackage import Resource
 from analysis.archive.making import (
     ANALYSIS,
     BIDS,
+    PREREGISTRATION,
     REQUESTS_FILE,
     RESULTS,
     RULES_FILE,
@@ -19,6 +20,7 @@ from analysis.archive.making import (
     ArchiveSettings,
     analysis_of,
     bids_files,
+    preregistration_faults,
 )
 from analysis.archive.pages import CITATION, ArchivedDesign
 from analysis.logs.exclusions import Rules
@@ -114,7 +116,10 @@ def export_archive(request: ArchiveRequest, track: Track = iter, progress: Progr
         _write_pages(part, settings, entries, _designs(runs))
         placing.write_file(part, CITATION, given or pages.citation(title, recoil_version()))
         for frozen in _preregistrations([request.folder, results.parent]):
-            placing.write_file(part, f"preregistration/{frozen.name}", frozen.read_bytes())
+            placing.write_file(part, f"{PREREGISTRATION}/{frozen.name}", frozen.read_bytes())
+        untrusted = [
+            f"{fault}; mend it in the study's folder, and export again" for fault in preregistration_faults(part)
+        ]
         _write_package(part, title, runs)
         files = manifest.manifest_bytes(part)
         placing.write_file(part, manifest.MANIFEST_FILE, files)
@@ -125,7 +130,7 @@ def export_archive(request: ArchiveRequest, track: Track = iter, progress: Progr
         participants=len({run.code for run in runs}),
         runs=len(runs),
         left_out=tuple(map(str, (*logs.problems, *unproven))),
-        remarks=(*map(str, logs.remarks), *map(str, logs.begun)),
+        remarks=(*map(str, logs.remarks), *map(str, logs.begun), *untrusted),
     )
 
 

@@ -9,8 +9,11 @@ from analysis.archive import bids_export
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request
 from experiments.config.door import Model, Text, checked_table, read_text
+from experiments.record import journal
+from experiments.study import preregistration
 
 SETTINGS, RESULTS, ANALYSIS, BIDS = "archive.json", "results", "analysis", "bids"
+PREREGISTRATION = "preregistration"
 RULES_FILE, REQUESTS_FILE = f"{ANALYSIS}/rules.toml", f"{ANALYSIS}/requests.toml"
 
 
@@ -44,6 +47,14 @@ def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
         requests=requests if requests.is_file() else None,
         against_frozen=False,
     )
+
+
+def preregistration_faults(folder: Path) -> list[str]:
+    """What of an archive's preregistrations was edited or is missing, also what its journals name."""
+    chain = preregistration.read_chain(folder / PREREGISTRATION)
+    journals = sorted((folder / RESULTS).glob(f"sub-*/*{journal.ENDING}"))
+    gone = preregistration.missing(chain, preregistration.carried_by(journals))
+    return [text.replace(f"{folder}/", "").partition("; ")[0] for text in (*chain.problems, *gone)]
 
 
 def bids_files(folder: Path, settings: ArchiveSettings) -> dict[str, bytes]:

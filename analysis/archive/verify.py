@@ -83,6 +83,7 @@ def verify(folder: Path, track: Track = iter) -> Verified:
             try:
                 made = [*_made_again(folder, Path(place), hashes.listed, track)]
                 faults, remarks = _compared(folder, hashes.listed, made)
+                faults += making.preregistration_faults(folder)
                 rebuilt = len(made)
             except RecoilError as error:
                 said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")

@@ -280,7 +280,9 @@ def _read(path: Path, number: int) -> Preregistration:
         raise PreregistrationError(
             f"{path}: was edited, or is of another version of Recoil ({why}); {_RESTORE}"
         ) from error
-    if one.sha256 != stated or one.number != number or STUDY_FILE not in one.files:
+    if one.sha256 == stated and one.number != number:
+        raise PreregistrationError(f"{path}: was renamed: it is preregistration {one.number}; give it its name back")
+    if one.sha256 != stated or STUDY_FILE not in one.files:
         raise PreregistrationError(
             f"{path}: was edited: its content has the hash {one.short}, and it says {str(stated)[:SHORT]}; {_RESTORE}."
             f" A change that is meant goes into the configs; `recoil freeze {path.parent}` then writes an amendment"
@@ -376,7 +378,7 @@ def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[str]:
 
 def carried_by(paths: Iterable[Path]) -> Iterator[tuple[str, str]]:
     """The code and the hash that each journal names; who names none, or cannot be read, is left out."""
-    for path in paths:
+    for path in sorted(paths):
         try:
             head = journal.head(path)
         except JournalError:
