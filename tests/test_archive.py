@@ -317,11 +317,15 @@ def test_a_forger_who_writes_the_manifest_anew_is_found_by_the_journals(copy: Pa
     statistics = json.loads((copy / "analysis/statistics.json").read_bytes())
     mean = statistics["preference"]["means"]["vibration"]
     _edited(copy, "analysis/statistics.json", f"{mean!r}", f"{mean + 1}")
+    _edited(copy, "contents.csv", "P02,direction,1", "P02,direction,0")
+    _edited(copy, "contents.csv", "P02,preference,1,finished", "P02,preference,1,not finished")
     placing.write_file(copy, "preregistration/preregistration-2.md", b"14 participants")
     sealed(copy)
     found = verify(copy)
     said = "\n".join(found.faults)
     assert "preregistration/preregistration-2.json: is missing" in said
+    assert "contents.csv: P02, direction, finished: there is a journal, and no row" in said
+    assert "contents.csv: P02, preference, not finished: there is a row, and no such journal" in said
     assert f"{table}: line " in said
     assert "analysis/preference_long.csv: line " in said
     assert f" is {mean + 1} in the archive, its journals make {mean!r}" in said

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.archive import making, manifest, placing
+from analysis.archive.contents import CONTENTS
 from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
 from analysis.logs.reading import Track
 from analysis.report.serial import as_json
@@ -83,7 +84,7 @@ def verify(folder: Path, track: Track = iter) -> Verified:
             try:
                 made = [*_made_again(folder, Path(place), hashes.listed, track)]
                 faults, remarks = _compared(folder, hashes.listed, made)
-                faults += making.preregistration_faults(folder)
+                faults += [*_contents_faults(folder), *making.preregistration_faults(folder)]
                 rebuilt = len(made)
             except RecoilError as error:
                 said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")
@@ -158,6 +159,31 @@ def _compared(folder: Path, listed: Mapping[str, str], made: Sequence[_Made]) ->
     tables = {path for path in listed if _is_made(path)} - {one.path for one in made}
     faults += [f"{path}: no journal of the archive makes it" for path in sorted(tables)]
     return faults, remarks
+
+
+def _contents_faults(folder: Path) -> Iterator[str]:
+    """Runs whose journal is there and which the list of runs has otherwise, and the other way round."""
+    if not (folder / CONTENTS).is_file():
+        yield f"{CONTENTS}: missing: every archive has one"
+        return
+    try:
+        with (folder / CONTENTS).open(encoding="utf-8", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row.get("in_archive") != "0"]
+    except (ValueError, csv.Error) as error:
+        yield f"{CONTENTS}: cannot be read ({error})"
+        return
+    listed = sorted(tuple(str(row.get(key)) for key in ("participant_id", "experiment", "state")) for row in rows)
+    there = sorted(map(_as_listed, (folder / RESULTS).rglob(f"*{journal.ENDING}")))
+    for run in sorted({*listed, *there}):
+        if listed.count(run) != there.count(run):
+            what = "a journal, and no row" if run in there else "a row, and no such journal"
+            yield f"{CONTENTS}: {', '.join(run)}: there is {what}"
+
+
+def _as_listed(path: Path) -> tuple[str, ...]:
+    """A run as its row of the list has it."""
+    found = journal.read_journal(path)
+    return found.plan.participant_id, found.plan.experiment, "finished" if found.finished else "not finished"
 
 
 def _is_made(path: str) -> bool:
