@@ -388,6 +388,8 @@ def test_what_is_there_is_never_overwritten(made: tuple[Path, Path, Archived], t
         archive_export.export_archive(ArchiveRequest(folder=study, out=study / "results" / "archive"))
     with pytest.raises(PlaceError, match="whose logs would then be read twice"):
         archive_export.export_archive(ArchiveRequest(folder=study / "results", out=study / "archive"))
+    with pytest.raises(PlaceError, match="lies in the archive"):
+        archive_export.export_archive(ArchiveRequest(folder=study, out=archive / "inner"))
     assert tree(archive) == before
 
 

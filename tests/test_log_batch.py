@@ -254,3 +254,10 @@ def test_files_are_found_in_the_order_of_their_paths_and_links_once(tmp_path: Pa
     expected = sorted([*tmp_path.rglob("*_trials.csv"), *tmp_path.rglob("*_ratings.csv")])
     assert found.problems == ()
     assert [Path(log) for log in found.logs] == [path for path in expected if path != linked]
+
+
+def test_a_participant_whose_folder_is_a_link_is_named_and_not_read(tmp_path: Path) -> None:
+    write_study(tmp_path / "a", participants=1)
+    (tmp_path / "a" / "sub-P07").symlink_to(tmp_path / "a" / "sub-P01")
+    (said,) = find_logs([tmp_path]).problems
+    assert (said.participant, "linked folders are not read" in said.message) == ("P07", True)

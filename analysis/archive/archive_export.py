@@ -144,6 +144,10 @@ def _free_target(request: ArchiveRequest) -> Path:
     target = shown.resolve()
     if target.is_relative_to(study):
         raise PlaceError(f"{shown}: lies in {study}, whose logs would then be read twice; choose an --out beside it")
+    if within := [one for one in target.parents if (one / manifest.MANIFEST_FILE).exists()]:
+        raise PlaceError(
+            f"{shown}: lies in the archive {within[0]}, which would be whole no more; choose another --out"
+        )
     if not placing.is_free(target):
         raise PlaceError(f"{shown}: is there already, and no archive is overwritten; move it away, or choose an --out")
     return target

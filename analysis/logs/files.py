@@ -39,6 +39,7 @@ class BadLogError(RecoilError):
 
 
 _NO_FILE = "a link that leads to no file; fetch what it stands for (`git annex get`, `datalad get`), or delete it"
+_LINKED = "a link to a folder, and linked folders are not read, so nobody is read twice; put the folder itself here"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +145,10 @@ def _study(real: str, top: str) -> str:
 
 
 def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) -> dict[str, str]:
-    """The files below a folder by their real paths, in the order of their paths. Linked folders are not entered."""
+    """The files below a folder by their real paths, in the order of their paths.
+
+    Linked folders are not entered; a participant's is named.
+    """
     logs: list[tuple[str, str]] = []
     waiting = [(str(folder), os.path.realpath(folder))]
     while waiting:
@@ -154,12 +158,11 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
                 for entry in entries:
                     if entry.is_dir(follow_symlinks=False):
                         waiting.append((entry.path, f"{real}{os.sep}{entry.name}"))
+                    elif why := _why_not_read(entry, endings):
+                        problems.append(_not_read(entry.path, why))
                     elif entry.name.endswith(endings):
                         target = os.path.realpath(entry.path) if entry.is_symlink() else f"{real}{os.sep}{entry.name}"
-                        if entry.is_file():
-                            logs.append((entry.path, target))
-                        else:
-                            problems.append(_no_file(entry.path))
+                        logs.append((entry.path, target))
         except OSError as error:
             reason = f"cannot be read: {error.strerror or error}"
             problems.append(Problem(file=Path(place), line=None, column=None, message=reason))
@@ -169,11 +172,18 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
     return found
 
 
-def _no_file(path: str) -> Problem:
+def _why_not_read(entry: os.DirEntry[str], endings: tuple[str, ...]) -> str:
+    """Why a link that looks like a log or a participant's folder is not read; empty if nothing is wrong."""
+    if entry.name.endswith(endings):
+        return "" if entry.is_file() else _NO_FILE
+    return _LINKED if entry.name.startswith("sub-") and entry.is_dir() else ""
+
+
+def _not_read(path: str, why: str) -> Problem:
     folder, _, name = path.rpartition(os.sep)
     real = os.path.realpath(folder)
     study = _study(f"{real}{os.sep}{name}", real)
-    return BadLogError(_NO_FILE).of(Path(path), code_in_name(path) or "", experiment_in_name(path), study)
+    return BadLogError(why).of(Path(path), code_in_name(f"{path}_") or "", experiment_in_name(path), study)
 
 
 def code_in_name(path: str) -> str | None:
