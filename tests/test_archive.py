@@ -98,6 +98,7 @@ def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path
         "| preference | broken | 1 | left out: table or journal breaks a rule, or was changed since the run |" in page
     )
     assert "Some participants are synthetic" in page
+    assert "preregistrations, with their dates, the reasons of amendments" in page
     assert "Runs in the archive, and left out" in (archive / "analysis" / "report.md").read_text()
     assert {path.parts[0] for path in (Path(one) for one in tree(archive / "results"))} == {
         *("sub-P01", "sub-P02", "sub-P03", "participants.jsonl"),
