@@ -164,8 +164,8 @@ def _needs_gui() -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         raise PlaceError(
-            f"--screen console needs the extra `gui` ({error.name} is missing): uv pip sync --python .venv "
-            "--require-hashes requirements/full.txt, or use --screen terminal"
+            f"--screen console needs the screens ({error.name} is missing): run `make full` in Recoil's folder "
+            "(without make: docs/install.md), or use --screen terminal"
         ) from error
 
 

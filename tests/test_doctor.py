@@ -242,7 +242,7 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_keys(replace(KEYS, to_event_ms=[0.4, 40.0])), "warning", "more than 10 ms"),
         (verdicts.of_keys(Keys(injected=30, to_event_ms=[], to_painted_ms=[])), "warning", "in front"),
         (verdicts.of_absent("display", "neither is set"), "not there", "DISPLAY"),
-        (verdicts.of_absent("PsychoPy", "psychopy is not installed"), "not there", "recoil[gui]"),
+        (verdicts.of_absent("PsychoPy", "psychopy is not installed"), "not there", "make full"),
         (verdicts.of_failure("display", "was killed by signal 6"), "fails", "libxcb-icccm4"),
         (verdicts.of_failure("clock", "did not end within 20 s"), "fails", "look again"),
     ],

@@ -113,7 +113,8 @@ def _file(study: StudyFolder, key: str, name: str) -> Path:
     path = study.source.parent / name
     if not path.is_file():
         place = key if key == "paper" else f"preregistration.{key}"
-        raise ConfigError(at_key(study.source, f"{place} = {name!r}: no such file beside the study; leave the key out"))
+        rule = f"{place} = {name!r}: no such file beside the study; write it, or leave the key out"
+        raise ConfigError(at_key(study.source, rule))
     return path
 
 

@@ -109,7 +109,10 @@ MIN_FREE_BYTES = 100_000_000
 MIN_WIDTH_PX, MIN_HEIGHT_PX = 1024, 720
 """Assumed: what the console needs for its large type."""
 
-INSTALL = 'install the screens: pip install "recoil[gui]", on Python 3.11 or 3.12, as PsychoPy allows no later one'
+INSTALL = (
+    "install the screens: `make full` in Recoil's folder (without make: docs/install.md), on Python 3.11 or 3.12, as "
+    "PsychoPy allows no later one"
+)
 
 
 def of_machine(found: figures.Machine) -> figures.DoctorFinding:
