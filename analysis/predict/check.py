@@ -131,6 +131,10 @@ def sections(found: DesignCheck | StudyCheck) -> tuple[Section, ...]:
     if isinstance(found, DesignCheck):
         return design_sections(found)
     asked = found.eligibility.model_dump(mode="json", exclude_none=True)
-    rules = ", ".join(f"{key} {value}" for key, value in asked.items() if value)
+    rules = "; ".join(f"{key} {_listed(value)}" for key, value in asked.items() if value)
     title = f"Study: {found.study}, {found.participants} participants; eligibility: {rules or 'everyone'}"
     return Section(title=title), *(section for one in found.experiments for section in sections(one))
+
+
+def _listed(value: object) -> str:
+    return ", ".join(value) if isinstance(value, list) else str(value)

@@ -66,7 +66,7 @@ class CellCheck:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignCheck:
-    """What a design means for some participants. `orders`: what each meets, session by session.
+    """What a design means for some participants. `orders`: what each meets, session by session, or first trials.
 
     `felt_forward_rates`: of synthetic participants who decide on what the gun does, by method and instruction.
     """
@@ -160,7 +160,7 @@ def _order(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
         return tuple(levels_text(sessions[number], blocked) for number in sorted(sessions))
     return (
         *((levels_text(plan.trials[0], blocked),) if blocked else ()),
-        *(trial_text(design, one) for one in plan.trials[:6]),
+        *(trial_text(design, one) for one in plan.trials[:_TRIALS_SHOWN]),
     )
 
 
@@ -220,9 +220,13 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
     minutes, stated = found.duration_s / 60, found.stated_duration_s / 60
     a8 = found.exposure
     duration = f"{minutes:.1f} min planned ({stated:.3g} min stated), of which breaks {found.break_s:g} s"
+    orders = (
+        f"Orders    of sessions, or of the first {_TRIALS_SHOWN} trials where there is one session, as drawn with seed "
+        f"{found.seed}; a run without a seed draws its own"
+    )
     shaken = (
-        f"Vibration {a8.a8_m_s2:.2f} m/s² A(8) in this run at the most, beside the action value of {a8.action_m_s2:g} "
-        f"and the limit of {a8.limit_m_s2:g} m/s² of 2002/44/EC; assumed: {a8.assumed}"
+        f"Exposure  of the hand to vibration: {a8.a8_m_s2:.2f} m/s² A(8) in this run at the most, beside the action "
+        f"value of {a8.action_m_s2:g} and the limit of {a8.limit_m_s2:g} m/s² of 2002/44/EC; assumed: {a8.assumed}"
     )
     return (
         Section(title=f"{found.title} ({found.experiment})", paragraphs=found.text),
@@ -230,7 +234,7 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
             title="Plan",
             items=(
                 f"Duration  {found.trials} trials, {duration}",
-                f"Orders    (seed {found.seed})",
+                orders,
                 *(f"  {code:10} {' > '.join(order)}" for code, order in found.orders.items()),
                 shaken,
                 *(f"Warning   {one}" for one in found.warnings),
@@ -271,6 +275,7 @@ def _cells(cells: Sequence[CellCheck]) -> Table:
     return Table(caption=f"Cells{more}", header=header, rows=rows)
 
 
+_TRIALS_SHOWN = 6
 _LIMITS = (
     f"Limits that no config can lift: {MAX_VOLTAGE_V:g} V, pulse {1000 * MAX_PULSE_S:g} ms, duty {100 * MAX_DUTY:g} % "
     f"over any second, {MAX_SHOTS_PER_MINUTE:g} shots a minute, coil {MAX_COIL_C:g} °C"
