@@ -163,14 +163,16 @@ _README = """# {title}
 
 Edit the configs here; every number of the protocol is in them.
 
-    recoil check study.toml                                   the design, the orders, the duration, the limits
-    recoil reproduce --study study.toml --out simulated       the whole study with synthetic participants
-    recoil freeze .                                           a preregistration, whose hash every later run carries
-    recoil doctor                                             the rig's self-test
-    recoil run direction.toml --screen console                sessions at the console, from its start window
-    recoil run direction.toml --participant P01               a session on a terminal
-    recoil study .                                            who is done, in progress, excluded, next
-    recoil analyze results --out analysis                     statistics, figures and report of all logs
+| command | does |
+| --- | --- |
+| `recoil check study.toml` | the design, the orders, the duration, the limits |
+| `recoil reproduce --study study.toml --out simulated` | the whole study with synthetic participants |
+| `recoil freeze .` | a preregistration, whose hash every later run carries |
+| `recoil doctor` | the rig's self-test |
+| `recoil run direction.toml --screen console` | runs at the console, from its start window |
+| `recoil run direction.toml --participant P01` | a run on a terminal |
+| `recoil study .` | who is done, in progress, excluded, next |
+| `recoil analyze results --out analysis` | statistics, figures and report of all logs |
 
 Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names.
 """
@@ -180,13 +182,15 @@ _README_OF_DESIGN = """# {title}
 
 `{name}.toml` is the design: what varies, in which order, what is asked. Edit it, and look at what it comes to:
 
-    recoil check {name}.toml                                  the plan as a Methods section, cells, orders, duration
-    recoil run {name}.toml --participant S01 --screen synthetic --results simulated    one simulated run
-    recoil freeze .                                           a preregistration, whose hash every later run carries
-    recoil doctor                                             the rig's self-test
-    recoil run {name}.toml --screen console                   sessions at the console, from its start window
-    recoil study .                                            who is done, in progress, excluded, next
-    recoil analyze results --out analysis                     statistics, figures and report of all logs
+| command | does |
+| --- | --- |
+| `recoil check {name}.toml` | the plan as a Methods section, cells, orders, duration |
+| `recoil run {name}.toml --participant S01 --screen synthetic --results simulated` | one simulated run |
+| `recoil freeze .` | a preregistration, whose hash every later run carries |
+| `recoil doctor` | the rig's self-test |
+| `recoil run {name}.toml --screen console` | runs at the console, from its start window |
+| `recoil study .` | who is done, in progress, excluded, next |
+| `recoil analyze results --out analysis` | statistics, figures and report of all logs |
 
 Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names. `study.toml` says how
 many people there are; who may take part is asked once you write [eligibility] into it.
