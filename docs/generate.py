@@ -182,14 +182,14 @@ def _default(schema: dict[str, Any], required: bool) -> str:
 
 
 def _comments(path: Path) -> dict[str, str]:
-    """The value and comment of each key that stands on one line of a shipped file, the first if it comes again."""
-    found: dict[str, str] = {}
+    """The value and comment of each key on one line of a shipped file, but of those that have several values there."""
+    found: dict[str, set[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         if read := re.match(r"#? ?([A-Za-z_]+) = ([^#\n]*[^#\s\[])\s*(?:#\s*(.*))?$", line):
             key, value, comment = read.groups()
             shown = value if len(value) < 40 else value[:37] + "..."
-            found.setdefault(key, f"`{shown}`" + (f" — {comment}" if comment else ""))
-    return found
+            found.setdefault(key, set()).add(f"`{shown}`" + (f" — {comment}" if comment else ""))
+    return {key: only for key, (only, *others) in found.items() if not others}
 
 
 def _numbers(kind: str) -> str:
