@@ -56,7 +56,7 @@ def test_what_nesting_makes_differ_is_told_of_every_group_and_session():
         ("voltages", "Method (asymmetric-1) was the same in all trials."),
         ("voltages", "each condition as evenly over the sets as it goes"),
         ("voltages", "No level of direction came more than 4 times in a row."),
-        ("detection", "60 catch trials in a session had no stimulus."),
+        ("detection", "Of the trials of a session 60 were catch trials, without a stimulus."),
         ("stronger", "two shots 1.5 s apart, one at the standard (voltage in V: 14), each equally often first"),
         ("magnitude", "each condition equally often in every set"),
         ("realism", "The experimenter set damper by hand."),

@@ -147,7 +147,7 @@ def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
     trial = design.trial
     yield f"A trial was {_one_interval(design) if trial.intervals == 1 else _several_intervals(design, planned)}."
     if trial.catch:
-        yield f"{trial.catch} catch trials in a session had no stimulus."
+        yield f"Of the trials of a session {trial.catch} were catch trials, without a stimulus."
     yield "Participants were told whether they were right." if trial.feedback else "There was no feedback."
     if design.practice.repetitions:
         each = _listed([factor_words(name) for name in design.practice.of])
