@@ -896,8 +896,9 @@ _TAIL = """
 - Rows of trials are copies of others if they are the same in all that was asked, in the answers and in the response
   times to the ms, and would be so by chance less than once in 10^9. A log says by itself how rare its rows are: each
   counts −ln(share of its answer among those to the same question) − ln(share of its time among its times), and the sum
-  over the rows of one copy is above ln 10^9 = 20.7; where answers follow the answer before, or times go on in equal
-  steps, as made ones do, the shares are those of what followed it, and of the steps. Stretches of ten rows with times
+  over the rows of one copy is above ln 10^9 = 20.7; where answers follow the answers or the question before, as in a
+  person who presses the keys in turn, or times go on in equal steps, as made ones do, the shares are those of what
+  followed. Stretches of ten rows with times
   are looked for wherever they stand. Without times whole logs are compared with each other, and a log with itself: is
   it one part twice, thrice, five or seven times over, or each of its rows? Logs that are so in the same way are judged
   by the sum of them all.

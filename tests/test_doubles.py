@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -82,3 +84,17 @@ def test_made_logs_with_times_in_equal_steps_are_no_copies() -> None:
     first_right = np.arange(ROWS) < 40
     times = 500 + 10 * np.arange(ROWS)
     assert doubles_among([told(number, first_right, times) for number in (0, 1)], [0, 1]) == []
+
+
+@pytest.mark.parametrize("turns", [(0, 1), (0, 0, 1), (0, 0, 1, 1)])
+def test_people_who_press_the_keys_in_turn_whatever_is_asked_are_no_copies(turns: tuple[int, ...]) -> None:
+    asked = np.random.default_rng(5).integers(1, 7, ROWS).astype(np.uint64)
+    some = [told(number, np.resize(turns, ROWS), np.full(ROWS, -1)) for number in (0, 1)]
+    assert doubles_among([replace(one, asked=asked) for one in some], [0, 1]) == []
+
+
+def test_people_who_answer_what_was_asked_the_trial_before_are_no_copies() -> None:
+    asked = np.random.default_rng(6).integers(1, 7, ROWS).astype(np.uint64)
+    late = np.append(0, asked[:-1] % np.uint64(2))
+    some = [told(number, late, np.full(ROWS, -1)) for number in (0, 1)]
+    assert doubles_among([replace(one, asked=asked) for one in some], [0, 1]) == []

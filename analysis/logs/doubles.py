@@ -3,10 +3,10 @@
 A stretch of rows is a double if it is the same in all that was asked, in what was answered and in the response times to
 the ms, and would be so by chance less often than once in 10^9. How often that is, a log says itself: of each row
 -ln(share of its answer among those to the same question) - ln(share of its time among the log's), summed over the rows
-of one copy, must be above ln 10^9 = 20.7. Of answers that follow the one before, and times in equal steps, as made ones
-are, the shares are those among what followed it and among the steps, where these surprise less. Stretches of ten rows
-are looked for wherever they stand; without times, only whole logs, and logs that are one block, or each row, several
-times over; of these, all that are so together.
+of one copy, must be above ln 10^9 = 20.7. Of answers that follow the ones before or the question before, as those of
+people do who press the keys in turn, and of times in equal steps, as made ones are, the shares are those among what
+followed, where these surprise less. Stretches of ten rows are looked for wherever they stand; without times, only whole
+logs, and logs that are one block, or each row, several times over; of these, all that are so together.
 """
 
 from __future__ import annotations
@@ -152,17 +152,32 @@ def _surprise(told: ToldRows, rows: slice, copied: slice) -> float:
     return sum(min(float(nats[within].sum()) for nats in ways) for ways in (answers, times))
 
 
-def _of_answers(asked: _Hashes, answer: _Hashes) -> tuple[FloatArray, FloatArray]:
-    """The surprise of each answer among those to the same question, and among those after the same answer to it."""
-    plain = -np.log(_count(asked * _MIX[0] + answer * _MIX[1]) / _count(asked))
+def _of_answers(asked: _Hashes, answer: _Hashes) -> tuple[FloatArray, ...]:
+    """The surprise of each answer, given what a person may go by: the question, the last answers, the last question."""
+    zero = np.zeros_like(asked)
+    one, two, three = (_earlier(answer, rows) for rows in (1, 2, 3))
+    pairs = one * _MIX[0] + two * _MIX[2]
+    contexts = (asked, asked * _MIX[0] + _last_to_same(asked, answer) * _MIX[2], zero, one, pairs)
+    more = (pairs * _MIX[0] + three * _MIX[2], _earlier(asked, 1))
+    return tuple(_surprise_within(context, answer) for context in (*contexts, *more))
+
+
+def _surprise_within(context: _Hashes, answer: _Hashes) -> FloatArray:
+    return -np.log(_count(context * _MIX[0] + answer * _MIX[1]) / _count(context))
+
+
+def _earlier(values: _Hashes, rows: int) -> _Hashes:
+    """What stood so many rows before; 0 where nothing did."""
+    return np.append(np.zeros(rows, dtype=np.uint64), values)[: len(values)]
+
+
+def _last_to_same(asked: _Hashes, answer: _Hashes) -> _Hashes:
+    """The answer before to the same question; 1 where there is none."""
     order = np.argsort(asked, kind="stable")
-    before = np.empty_like(answer)
-    before[order] = np.append(answer[order][:1], answer[order][:-1])
-    new = np.empty(len(asked), dtype=np.bool_)
-    new[order] = np.append(True, np.diff(asked[order]) != 0)
-    context = asked * _MIX[0] + np.where(new, np.uint64(1), before) * _MIX[2]
-    after = -np.log(_count(context + answer * _MIX[1]) / _count(context))
-    return plain, np.where(new, plain, after)
+    new = np.append(True, np.diff(asked[order]) != 0)[: len(asked)]
+    last = np.empty_like(answer)
+    last[order] = np.where(new, np.uint64(1), _earlier(answer[order], 1))
+    return last
 
 
 def _of_times(time_ms: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
