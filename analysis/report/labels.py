@@ -22,7 +22,7 @@ LONGEST = 32
 """Columns of text that a name has at most; a longer one is cut. A Chinese character takes two."""
 _ELLIPSIS = "…"
 _OPEN, _CLOSE = "\N{FIRST STRONG ISOLATE}", "\N{POP DIRECTIONAL ISOLATE}"
-_PART = re.compile(r"\s+|[^\s-]*-+|[^\s-]+")
+_PART = re.compile(r"\s+|…\[\d+\]|[^\s…-]*-+|[^\s…-]+|…")
 _NO_WORD = re.compile(r"[\d_\s-]|[^\x00-\x7f]|.{13}")
 """What makes a code no word of a sentence, so that it may be replaced in one."""
 
@@ -101,6 +101,8 @@ def lines_of(text: str, width: int) -> list[str]:
 
     >>> lines_of("a slow ramp", 6), lines_of("不对称力", 6), lines_of("extraordinary", 8)
     (['a slow', 'ramp'], ['不对称', '力'], ['extraord', 'inary'])
+    >>> lines_of("extraordinary…[1]", 7)  # the mark of a name that was cut stays whole
+    ['extraor', 'dinary', '…[1]']
     """
     found = [""]
     for part in _kept_together(_parts(text, width)):
