@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from analysis.summary.participation import participation
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.experiments import direction_section
 from analysis.summary.sections.manuscript import manuscript_section
+from analysis.summary.sections.quality import quality_section
 from analysis.summary.sections.supplement import supplement_sections
 from experiments.clock import VirtualClock
 from experiments.study import register
@@ -46,12 +48,13 @@ def of_person(rows: list[TextRow], hand: str = "participant") -> list[TextRow]:
 
 
 def person(folder: Path, code: str, *, unanswered: int = 0, ratings: bool = False) -> None:
-    rows = of_person(trial_rows(code, int(code[1:])))
+    seed = int(code[1:]) + 100 * len(folder.name)
+    rows = of_person(trial_rows(code, seed))
     for row in rows[:unanswered]:
         row.update(response="", correct="", response_time_s="")
     write_rows(trials_path(folder, code), rows)
     if ratings:
-        write_rows(ratings_path(folder, code), of_person(rating_rows(code, int(code[1:]))))
+        write_rows(ratings_path(folder, code), of_person(rating_rows(code, seed)))
 
 
 @pytest.fixture
@@ -163,3 +166,51 @@ def test_of_logs_that_came_without_a_plan_nothing_is_called_planned(tmp_path: Pa
     words = repr([*manuscript_section(report), *direction_section(report), *supplement_sections(report)])
     assert "Comparisons of all pairs" in words
     assert "lanned" not in words
+
+
+def test_the_scale_of_a_paper_is_the_one_that_people_rated_on(tmp_path: Path, reported: Reported) -> None:
+    (tmp_path / "map.toml").write_text(
+        'experiment = "preference"\nparticipant.column = "who"\ncolumns = { method = "what", rating = "liked" }\n'
+        "rating = { scale_min = 1, scale_max = 7, grain = 1 }\n"
+    )
+    (tmp_path / "lab.csv").write_text("who,what,liked\nA,x,1\nA,y,3\nA,z,5\nB,x,2\nB,y,5\nB,z,7\n")
+    said = quotes(reported(tmp_path / "lab.csv", columns=tmp_path / "map.toml"))
+    assert "was rated from 1 to 7. Ratings were rescaled linearly to 0 to 10." in said
+
+
+@pytest.fixture
+def careless(tmp_path: Path, reported: Reported) -> ReportData:
+    """Two who say the same to everything, one who is always wrong, one without times, and one who has fewer trials."""
+    flipped = {"forward": "backward", "backward": "forward"}
+    for code, seed in (("P01", 1), ("P02", 2), ("P03", 3), ("P04", 4), ("P05", 5)):
+        rows = of_person(trial_rows(code, seed))
+        for row in rows:
+            said = {"P01": "forward", "P02": "forward", "P03": flipped[row["direction"]]}.get(code, row["response"])
+            row.update(response=said, correct=str(int(said == row["direction"])))
+            row.update({"response_time_s": "", "response_time_valid": ""} if code == "P04" else {})
+        kept = [row for row in rows if code != "P05" or int(row["trial"]) <= 15]
+        write_rows(trials_path(tmp_path / "results", code), kept)
+    return reported(tmp_path / "results")
+
+
+def test_people_who_say_the_same_to_everything_are_named_and_kept(careless: ReportData) -> None:
+    (section,) = quality_section(careless)
+    told = "\n".join(section.items)
+    assert "participants who said forward in every trial (kept): P01, P02." in told
+    assert "participants who were wrong in every trial (kept): P03." in told
+    assert "said backward" not in told
+
+
+def test_numbers_of_trials_that_differ_are_said_as_they_are(careless: ReportData) -> None:
+    assert re.search(r"the direction of \d+ to 10 forward and \d+ to 10 backward shots with each", quotes(careless))
+    (section,) = quality_section(careless)
+    assert any("not everybody has as many trials" in item for item in section.items)
+
+
+def test_times_that_are_not_there_are_not_laid_on_the_experimenter(careless: ReportData) -> None:
+    (section,) = quality_section(careless)
+    assert "60 answered trials have none: there is no time in the log, or " in section.paragraphs[0]
+    assert careless.statistics.direction is not None
+    found = careless.statistics.direction.speed_accuracy
+    assert found is not None
+    assert [*found.refused] == ["no_time"]

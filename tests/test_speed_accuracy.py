@@ -268,7 +268,7 @@ def test_single_times_that_are_nobodys_own_are_counted_by_reason(tmp_path: Path)
     write_rows(trials_path(tmp_path, "P01"), rows)
     found = found_in(tmp_path)
     counts = {reason: one["trials"] for reason, one in found["refused"].items()}
-    assert counts == {"experimenter": 2, "no_source": 1, "not_valid": 1, "no_time": 1, "not_above_0": 2}
+    assert counts == {"experimenter": 2, "no_source": 1, "no_time": 1, "not_valid": 1, "not_above_0": 2}
     assert found["n"] == found["answered"] - sum(counts.values()) == 53
     assert sum(cell["neutral"]["n"] for cell in found["methods"].values()) == 53
 

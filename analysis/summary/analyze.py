@@ -154,6 +154,7 @@ def _analysis(
         comparison=compared,
         beside=tuple(main.tables),
         provenance=provenance() | _read_by(request.columns, files.mapping),
+        rated_from=_rating_ends(logs, files.mapping),
         extra=(*request.extra, *told.extra),
         apart=tuple(_told(one) for one in others),
     )
@@ -303,6 +304,13 @@ def _notes(effect: ExclusionEffect | None) -> list[str]:
         recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")
     return notes
+
+
+def _rating_ends(logs: Logs, mapping: ColumnMap | None) -> tuple[float, float]:
+    """The ends of the scale that ratings were given on."""
+    if not logs.mapped or mapping is None or mapping.rating is None:
+        return 0.0, 10.0
+    return mapping.rating.scale_min, mapping.rating.scale_max
 
 
 def _read_by(path: Path | None, mapping: ColumnMap | None) -> dict[str, str]:

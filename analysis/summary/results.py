@@ -237,7 +237,10 @@ class Scores:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledBinomial:
-    """The exact binomial test of all participants' answers against guessing, and how they cluster in people."""
+    """The exact binomial test of all participants' answers against guessing, and how they cluster in people.
+
+    `fewest_and_most` trials of a participant, where not everybody has as many.
+    """
 
     successes: int
     trials: int
@@ -249,6 +252,7 @@ class PooledBinomial:
     wilson_low: float
     wilson_high: float
     clustering: Clustering
+    fewest_and_most: tuple[int, int] | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -310,14 +310,16 @@ def _binomials(cells: TrialCells, method: str) -> dict[str, results.PooledBinomi
     result: dict[str, results.PooledBinomial] = {}
     for place, direction in enumerate(DIRECTIONS):
         column = cells.methods.index(method), place
-        successes, trials = int(cells.correct[:, *column].sum()), int(cells.trials[:, *column].sum())
+        each = cells.trials[:, *column]
+        successes, trials = int(cells.correct[:, *column].sum()), int(each.sum())
         if trials:
             test = binomial_test(successes, trials)
             result[direction] = results.PooledBinomial(
                 successes=successes,
                 trials=trials,
                 **{field.name: float(getattr(test, field.name)) for field in fields(test)},
-                clustering=clustering(cells.correct[:, *column], cells.trials[:, *column]),
+                clustering=clustering(cells.correct[:, *column], each),
+                fewest_and_most=None if (each == each[0]).all() else (int(each.min()), int(each.max())),
             )
     return result
 

@@ -133,8 +133,8 @@ INSTRUCTION_ORDER = ("speed", NEUTRAL, "accuracy")
 REFUSALS = {
     "experimenter": f"the time came from the experimenter's hand: {REASON}",
     "no_source": "response_source is empty: nobody knows whose hand the time came from",
-    "not_valid": "response_time_valid is not 1: the time is not said to be the participant's own",
     "no_time": "there is no time",
+    "not_valid": "response_time_valid is not 1: the time is not said to be the participant's own",
     "not_above_0": "the time is not above 0",
 }
 """Why an answered trial is refused; of several reasons the first counts."""
@@ -160,8 +160,8 @@ def timed(trials: pd.DataFrame) -> Timed:
     faults = {
         "experimenter": (sources == "experimenter")[source],
         "no_source": ~np.isin(sources, (*OWN_SOURCES, "experimenter"))[source],
-        "not_valid": ~(trials["response_time_valid"] == 1).fillna(value=False).to_numpy(dtype=np.bool_),
         "no_time": np.isnan(time_s),
+        "not_valid": ~(trials["response_time_valid"] == 1).fillna(value=False).to_numpy(dtype=np.bool_),
         "not_above_0": time_s <= 0.0,
     }
     answered = trials["correct"].notna().to_numpy(dtype=np.bool_)

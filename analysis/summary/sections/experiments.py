@@ -104,7 +104,7 @@ def pairs_sentence(found: WithinStatistics, experiment: str, *, full: bool = Fal
         return ""
     if has_many(found):
         differing = sum(pair.p < SIGNIFICANT for pair in found.tukey)
-        told = f"of {len(found.tukey)} pairs {differing} differed; the table has all"
+        told = f"{differing or 'none'} of {len(found.tukey)} pairs differed significantly; the table has all"
         return f"{comparisons(planned=planned)} (Tukey's HSD): {told}."
     tests = zip(found.tukey, found.supplement.paired_t, strict=True)
     pairs = "; ".join(_pair_words(pair, _tested(pair, t, experiment, full=full)) for pair, t in tests)

@@ -40,7 +40,7 @@ def _of_experiment(report: ReportData, name: str, found: WithinStatistics) -> It
     title = EXPERIMENTS[name].capitalize()
     people = _people(report, name, found.people, found.participants.codes)
     dropped = trials_dropped(report, name)
-    yield " ".join(filter(None, [f"{title}, participants and design. {people}", dropped, _design(found)]))
+    yield " ".join(filter(None, [f"{title}, participants and design. {people}", dropped, _design(report, found)]))
     if found.anova is not None:
         yield f"{title}, analysis. {_analysis(found)}"
     pairs = pairs_sentence(found, name, full=True, planned=report.planned)
@@ -86,10 +86,12 @@ _SEXES = {"female": "female", "male": "male", "other": "of another sex"}
 _HANDS = {"right": "right-handed", "left": "left-handed", "both": "ambidextrous"}
 
 
-def _design(found: WithinStatistics) -> str:
+def _design(report: ReportData, found: WithinStatistics) -> str:
     methods = f"{len(found.methods)} rendering methods ({', '.join(map(display_name, found.methods))})"
     if not isinstance(found, DirectionStatistics):
-        return f"Within participants, each of {methods} was rated from 0 to 10."
+        low, high = report.rated_from
+        rescaled = "" if report.rated_from == (0.0, 10.0) else ". Ratings were rescaled linearly to 0 to 10"
+        return f"Within participants, each of {methods} was rated from {low:g} to {high:g}{rescaled}."
     return (
         f"Within participants, the direction of {_shots(found)} each of {methods} was judged. The measure was the "
         "share of right answers on forward shots."
@@ -97,11 +99,24 @@ def _design(found: WithinStatistics) -> str:
 
 
 def _shots(found: DirectionStatistics) -> str:
-    """How many trials each participant had with a method, if all had as many."""
-    each = {tuple((way, test.trials / found.n) for way, test in tests.items()) for tests in found.binomial.values()}
-    if len(each) != 1:
-        return "single shots with"
-    return f"{' and '.join(f'{count:g} {way}' for way, count in each.pop())} shots with"
+    """How many trials each participant had with a method; the fewest and most where they were not as many."""
+    counts: dict[str, set[int]] = {}
+    for tests in found.binomial.values():
+        for way, test in tests.items():
+            counts.setdefault(way, set()).update(test.fewest_and_most or (test.trials // found.n,))
+    if not counts:
+        return "shots with"
+    each = (f"{_span(min(some), max(some))} {way}" for way, some in counts.items())
+    return f"{' and '.join(each)} shots with"
+
+
+def _span(low: int, high: int) -> str:
+    """A number, or two.
+
+    >>> _span(10, 10), _span(9, 20)
+    ('10', '9 to 20')
+    """
+    return f"{low:,}" if low == high else f"{low:,} to {high:,}"
 
 
 def _analysis(found: WithinStatistics) -> str:

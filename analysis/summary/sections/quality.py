@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from analysis.report.labels import display_name, named
 from analysis.report.section import Section, Table, shortened
 from analysis.stats.diagnostics import OUTLIER_RULE
-from analysis.summary.results import WithinStatistics
+from analysis.summary.results import DirectionStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.designs import lacking_conditions
 from analysis.summary.summary import UNDEFINED
@@ -19,7 +19,8 @@ def quality_section(report: ReportData) -> Iterator[Section]:
     statistics = report.statistics
     times = () if statistics.direction is None else (_times_sentence(statistics.direction.response_times),)
     tables = tuple(table for table in (_ends(report),) if table.rows)
-    items = shortened([*_warnings(report), *report.dropped, *_of_designs(report)], "warnings")
+    told = (*_warnings(report), *_of_answers(statistics.direction), *report.dropped, *_of_designs(report))
+    items = shortened([*told], "warnings")
     if statistics.analysed or items:
         yield Section(title="Data quality", paragraphs=times, tables=tables, items=items)
 
@@ -41,6 +42,35 @@ def _warnings(report: ReportData) -> Iterator[str]:
                 yield f"{EXPERIMENTS[name].capitalize()}: {named(entry.warning)}."
 
 
+def _of_answers(found: DirectionStatistics | None) -> Iterator[str]:
+    """Who said the same to whatever was shot, was always wrong, or had more or fewer trials than others; all kept."""
+    if found is None:
+        return
+    title = EXPERIMENTS["direction"].capitalize()
+    for words, forward, backward in (("said forward", 1.0, 0.0), ("said backward", 0.0, 1.0), ("were wrong", 0.0, 0.0)):
+        who = _people_with(found, forward, backward)
+        if who:
+            yield f"{title}: participants who {words} in every trial (kept): {_some(who)}."
+    uneven = [
+        f"{display_name(method)} {way} {_span(*test.fewest_and_most)}"
+        for method, tests in found.binomial.items()
+        for way, test in tests.items()
+        if test.fewest_and_most
+    ]
+    if uneven:
+        yield f"{title}: not everybody has as many trials, and each score counts alike: {_some(uneven)}."
+
+
+def _span(fewest: int, most: int) -> str:
+    return f"{fewest:,} to {most:,}"
+
+
+def _people_with(found: DirectionStatistics, forward: float, backward: float) -> list[str]:
+    """The participants with these correct rates on forward and on backward shots, whatever the method."""
+    alike = (found.participants.array == forward) & (found.backward.participants.array == backward)
+    return [code for code, yes in zip(found.participants.codes, alike.all(axis=1).tolist(), strict=True) if yes]
+
+
 def undefined_numbers(report: ReportData) -> Iterator[Section]:
     """The appendix' list of the numbers that data like these do not define."""
     found = [warning for warning in report.statistics.warnings if UNDEFINED in warning]
@@ -52,8 +82,8 @@ def undefined_numbers(report: ReportData) -> Iterator[Section]:
 def _times_sentence(times: ResponseTimes) -> str:
     """How many response times there are, and which are none."""
     left_out = (
-        f"{times.left_out:,} answered trials have none: it was entered or corrected by the experimenter, whose hand "
-        "tells nothing of the participant's time."
+        f"{times.left_out:,} answered trials have none: there is no time in the log, or the answer was entered or "
+        "corrected by the experimenter, whose hand tells nothing of the participant's time."
     )
     if not times.n:
         return f"There is no valid response time, and so no figure of them. {left_out}"
