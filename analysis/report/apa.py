@@ -80,8 +80,10 @@ def f_test(F: float | None, df: Sequence[float], p: float | None, *, exact: bool
 
     >>> f_test(28.4512, (2, 26), 2.7e-7)
     'F(2, 26) = 28.45, p < .001'
+    >>> f_test(math.inf, (2, 22), 0.0)  # everybody differs by the same
+    'F(2, 22) = ∞, p < .001'
     """
-    shown = number(F)
+    shown = "∞" if F is not None and math.isinf(F) else number(F)
     of = ", ".join(str(one) if isinstance(one, int) else number(one) for one in df)
     return f"F({of}) = {'undefined or infinite' if shown == NO_NUMBER else shown}, {p_value(p, exact=exact)}"
 

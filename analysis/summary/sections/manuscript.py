@@ -92,22 +92,21 @@ def _design(report: ReportData, found: WithinStatistics) -> str:
         low, high = report.rated_from
         rescaled = "" if report.rated_from == (0.0, 10.0) else ". Ratings were rescaled linearly to 0 to 10"
         return f"Within participants, each of {methods} was rated from {low:g} to {high:g}{rescaled}."
-    return (
-        f"Within participants, the direction of {_shots(found)} each of {methods} was judged. The measure was the "
-        "share of right answers on forward shots."
-    )
+    return f"{_shots(found, methods)}. The measure was the share of right answers on forward shots."
 
 
-def _shots(found: DirectionStatistics) -> str:
-    """How many trials each participant had with a method; the fewest and most where they were not as many."""
+def _shots(found: DirectionStatistics, methods: str) -> str:
+    """What was judged, and how many trials a participant has with a method: the fewest and most if not as many."""
     counts: dict[str, set[int]] = {}
     for tests in found.binomial.values():
         for way, test in tests.items():
             counts.setdefault(way, set()).update(test.fewest_and_most or (test.trials // found.n,))
-    if not counts:
-        return "shots with"
-    each = (f"{_span(min(some), max(some))} {way}" for way, some in counts.items())
-    return f"{' and '.join(each)} shots with"
+    if counts and all(len(some) == 1 for some in counts.values()):
+        shots = " and ".join(f"{min(some):,} {way}" for way, some in counts.items())
+        return f"Within participants, the direction of {shots} shots with each of {methods} was judged"
+    told = f"Within participants, the direction of shots with each of {methods} was judged"
+    spans = " and ".join(f"{_span(min(some), max(some))} {way}" for way, some in counts.items())
+    return f"{told}; {spans} trials of a participant with a method were analysed" if counts else told
 
 
 def _span(low: int, high: int) -> str:
