@@ -52,17 +52,13 @@ def _of_answers(found: DirectionStatistics | None) -> Iterator[str]:
         if who:
             yield f"{title}: participants who {words} in every trial (kept): {_some(who)}."
     uneven = [
-        f"{display_name(method)} {way} {_span(*test.fewest_and_most)}"
+        f"{display_name(method)} {way} {test.fewest_and_most[0]:,} to {test.fewest_and_most[1]:,}"
         for method, tests in found.binomial.items()
         for way, test in tests.items()
         if test.fewest_and_most
     ]
     if uneven:
         yield f"{title}: not everybody has as many trials, and each score counts alike: {_some(uneven)}."
-
-
-def _span(fewest: int, most: int) -> str:
-    return f"{fewest:,} to {most:,}"
 
 
 def _people_with(found: DirectionStatistics, forward: float, backward: float) -> list[str]:
