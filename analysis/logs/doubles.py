@@ -154,12 +154,13 @@ def _surprise(told: ToldRows, rows: slice, copied: slice) -> float:
 
 def _of_answers(asked: _Hashes, answer: _Hashes) -> tuple[FloatArray, ...]:
     """The surprise of each answer, given what a person may go by: the question, the last answers, the last question."""
-    zero = np.zeros_like(asked)
     one, two, three = (_earlier(answer, rows) for rows in (1, 2, 3))
-    pairs = one * _MIX[0] + two * _MIX[2]
-    contexts = (asked, asked * _MIX[0] + _last_to_same(asked, answer) * _MIX[2], zero, one, pairs)
-    more = (pairs * _MIX[0] + three * _MIX[2], _earlier(asked, 1))
-    return tuple(_surprise_within(context, answer) for context in (*contexts, *more))
+    last, new = _last_to_same(asked, answer)
+    plain = _surprise_within(asked, answer)
+    after = np.where(new, plain, _surprise_within(asked * _MIX[0] + last * _MIX[2], answer))
+    pair = one * _MIX[0] + two * _MIX[2]
+    contexts = (one, pair, pair * _MIX[0] + three * _MIX[2], _earlier(asked, 1))
+    return plain, after, *(_surprise_within(context, answer) for context in contexts)
 
 
 def _surprise_within(context: _Hashes, answer: _Hashes) -> FloatArray:
@@ -171,13 +172,13 @@ def _earlier(values: _Hashes, rows: int) -> _Hashes:
     return np.append(np.zeros(rows, dtype=np.uint64), values)[: len(values)]
 
 
-def _last_to_same(asked: _Hashes, answer: _Hashes) -> _Hashes:
-    """The answer before to the same question; 1 where there is none."""
+def _last_to_same(asked: _Hashes, answer: _Hashes) -> tuple[_Hashes, BoolArray]:
+    """The answer before to the same question, and where there is none: it was asked for the first time."""
     order = np.argsort(asked, kind="stable")
-    new = np.append(True, np.diff(asked[order]) != 0)[: len(asked)]
-    last = np.empty_like(answer)
-    last[order] = np.where(new, np.uint64(1), _earlier(answer[order], 1))
-    return last
+    first = np.append(True, np.diff(asked[order]) != 0)[: len(asked)]
+    last, new = np.empty_like(answer), np.empty(len(asked), dtype=np.bool_)
+    last[order], new[order] = np.where(first, np.uint64(1), _earlier(answer[order], 1)), first
+    return last, new
 
 
 def _of_times(time_ms: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
