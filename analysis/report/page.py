@@ -64,21 +64,24 @@ def with_code(text: str) -> str:
     return _CODE.sub(r"<code>\1</code>", html.escape(text))
 
 
+_ENVIRONMENT = Environment(
+    loader=PackageLoader("analysis.report"),
+    autoescape=select_autoescape(enabled_extensions=("html.j2",)),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
+"""One for all pages: it compiles each template once."""
+_ENVIRONMENT.filters |= {"markdown": markdown, "unbroken": unbroken, "with_code": with_code}
+
+
 def _render(template: str, title: str, parts: tuple[Section, ...], head: PageHead, figures: Path) -> str:
-    environment = Environment(
-        loader=PackageLoader("analysis.report"),
-        autoescape=select_autoescape(enabled_extensions=("html.j2",)),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"markdown": markdown, "unbroken": unbroken, "with_code": with_code}
     stems = [picture.stem for section in parts for picture in section.pictures]
     embedded = {stem: _embedded(figures / f"{stem}.png") for stem in stems}
     body = [section for section in parts if not section.appendix]
     appendix = [section for section in parts if section.appendix]
-    return environment.get_template(template).render(
+    return _ENVIRONMENT.get_template(template).render(
         title=title, head=head, body=body, appendix=appendix, embedded=embedded, verdicts=_VERDICTS
     )
 
