@@ -1,16 +1,18 @@
-"""Figures as PNG alone, which the pages show; SVG and PDF, over half of the drawing, where a test is about them."""
+"""Figures as small PNG alone, which the pages show; as users get them, thrice the work, where a test is about them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from analysis.report import page
 from analysis.report.figures import style
 
 ASKED = "RECOIL_TESTS_ALL_FIGURES"
 """A program of `tests/warm_start.py` with this variable saves figures as users get them."""
 _NAMES = {"svg": "FigureCanvasSVG", "pdf": "FigureCanvasPdf"}
 _CANVASES = {kind: getattr(style, name) for kind, name in _NAMES.items()}
+_USERS_DPI, _SMALL_DPI = style.PNG_DPI, 80
 
 
 class _Undrawn:
@@ -24,15 +26,30 @@ class _Undrawn:
 
 
 def leave_out() -> None:
-    """From now on this process saves figures as PNG alone."""
+    """From now on this process saves figures as PNG alone, of few pixels."""
     for name in _NAMES.values():
         setattr(style, name, _Undrawn)
+    _be_of(_SMALL_DPI)
 
 
 def draw(*kinds: str) -> None:
-    """From now on it saves these kinds too; without any, all, as users get them."""
+    """From now on it saves these kinds too, and PNG of full size; without any, all, as users get them."""
     for kind in kinds or _NAMES:
         setattr(style, _NAMES[kind], _CANVASES[kind])
+    _be_of(_USERS_DPI)
+
+
+def _be_of(dpi: int) -> None:
+    for module in (style, page):
+        module.PNG_DPI = dpi  # type: ignore[attr-defined]  # each imports it
+
+
+@contextmanager
+def full_size() -> Iterator[None]:
+    """In here figures have the pixels that users get, for tests of where things stand in them."""
+    _be_of(_USERS_DPI)
+    yield
+    _be_of(_SMALL_DPI)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +30,12 @@ from tests.made_scores import crowd_of
 from tests.shown_panels import saved_as, shot_panel
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def _full_size() -> Iterator[None]:
+    with figure_files.full_size():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import unicodedata
+from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
 
@@ -42,6 +43,7 @@ from experiments.record import storage
 from experiments.record.tables import guard
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
+from tests import figure_files
 from tests.conftest import RECOIL, Recoil
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows
 from tests.waiting import PATIENCE_S
@@ -247,8 +249,8 @@ def ten(tmp_path_factory: pytest.TempPathFactory) -> StudyStatistics:
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """The figures that are made, laid out and not written."""
+def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Figure]]:
+    """The figures that are made, laid out as for users and not written."""
     figures: list[Figure] = []
 
     def keep(figure: Figure, _: Path) -> None:
@@ -256,7 +258,8 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         figures.append(figure)
 
     monkeypatch.setattr(style, "save", keep)
-    return figures
+    with figure_files.full_size():
+        yield figures
 
 
 def _touching(figure: Figure) -> list[tuple[str, str]]:

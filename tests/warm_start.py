@@ -4,7 +4,7 @@ A child is a process with its own folder, environment, streams and session. Only
 done once for all tests. Who starts it holds a small process in its stead (`tests/warm_client.py`), which hands on
 signals and the exit code; if that one is killed, so is the child. How programs really start is for `tests/test_cli.py`.
 
-A child saves figures as PNG alone, unless it is asked for more (`tests/figure_files.py`).
+A child saves figures as small PNG alone, unless it is asked for more (`tests/figure_files.py`).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
 
+from analysis.report import page
 from tests import figure_files
 
 FOLDER = "RECOIL_TESTS_WARM_START"
@@ -215,6 +216,7 @@ def main(address: Path, owner: int) -> NoReturn:
         with suppress(ModuleNotFoundError):  # of an extra that is not installed: a program that needs it says so itself
             importlib.import_module(name)
     figure_files.leave_out()
+    page.write_page(address.parent, "", ())  # which compiles the pages' templates
     being = address.with_name("being-made")
     with socket.socket(socket.AF_UNIX) as door:
         door.bind(str(being))
