@@ -26,7 +26,6 @@ from tests.other_trials import turned
 
 pytestmark = pytest.mark.slow
 
-SEEDS = 600
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 DIRECTION, PREFERENCE = changed("direction").config, changed("preference").config
 LARGEST_SEED = 2**63 - 1
@@ -148,36 +147,41 @@ def facts(plan: Plan) -> Facts:
     return Facts(plan.methods, numbered and one_method_each and known, forward)
 
 
-def all_plans(balance: str) -> list[Facts]:
+def all_plans(balance: str, seeds: int) -> list[Facts]:
     config = direction_config("random", balance)
-    return [facts(plan_of(config, "P01", seed)) for seed in range(SEEDS)]
+    return [facts(plan_of(config, "P01", seed)) for seed in range(seeds)]
+
+
+@pytest.fixture(scope="module", params=[600, pytest.param(2000, marks=pytest.mark.soak)])
+def seeds(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
 
 
 @pytest.fixture(scope="module")
-def over_sessions() -> list[Facts]:
-    return all_plans("session")
+def over_sessions(seeds: int) -> list[Facts]:
+    return all_plans("session", seeds)
 
 
 @pytest.fixture(scope="module")
-def over_sets() -> list[Facts]:
-    return all_plans("set")
+def over_sets(seeds: int) -> list[Facts]:
+    return all_plans("set", seeds)
 
 
 @pytest.fixture(scope="module", params=["session", "set"])
-def either(request: pytest.FixtureRequest) -> list[Facts]:
-    return request.getfixturevalue("over_sessions" if request.param == "session" else "over_sets")
+def either(request: pytest.FixtureRequest, over_sessions: list[Facts], over_sets: list[Facts]) -> list[Facts]:
+    return over_sessions if request.param == "session" else over_sets
 
 
-def test_six_hundred_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts]) -> None:
-    assert len(either) == SEEDS
+def test_all_plans_have_three_sessions_of_four_sets_of_five_trials(either: list[Facts], seeds: int) -> None:
+    assert len(either) == seeds
     assert all(plan.numbered for plan in either)
 
 
-def test_six_hundred_plans_have_each_method_in_one_session(either: list[Facts]) -> None:
+def test_all_plans_have_each_method_in_one_session(either: list[Facts]) -> None:
     assert all(sorted(plan.methods) == sorted(METHODS) for plan in either)
 
 
-def test_six_hundred_plans_have_ten_forward_and_ten_backward_trials_a_session(either: list[Facts]) -> None:
+def test_all_plans_have_ten_forward_and_ten_backward_trials_a_session(either: list[Facts]) -> None:
     assert all(sum(session) == 10 for plan in either for session in plan.forward)
 
 
@@ -188,7 +192,7 @@ def test_a_set_of_five_holds_two_or_three_forward_trials_if_balanced_over_sets(o
 def test_which_sets_hold_three_is_random(over_sets: list[Facts]) -> None:
     # two sets of four: six choices, as often as each other; chi-square with 5 degrees of freedom, p = 1e-4
     choices = Counter(session for plan in over_sets for session in plan.forward)
-    expected = 3 * SEEDS / 6
+    expected = 3 * len(over_sets) / 6
     assert len(choices) == 6
     assert sum((count - expected) ** 2 for count in choices.values()) / expected < 25.74
 
@@ -200,7 +204,8 @@ def test_only_a_third_of_sessions_has_two_or_three_in_every_set_if_balanced_over
     share = math.comb(4, 2) * math.comb(5, 2) ** 4 / math.comb(20, 10)
     even = sum(set(session) <= {2, 3} for plan in over_sessions for session in plan.forward)
     assert share == pytest.approx(1 / 3, abs=0.01)
-    assert even / (3 * SEEDS) == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / (3 * SEEDS)))
+    sessions = 3 * len(over_sessions)
+    assert even / sessions == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / sessions))
 
 
 def test_sets_take_every_possible_count_if_balanced_over_sessions(over_sessions: list[Facts]) -> None:
@@ -208,14 +213,15 @@ def test_sets_take_every_possible_count_if_balanced_over_sessions(over_sessions:
     counts = Counter(count for plan in over_sessions for session in plan.forward for count in session[:1])
     for forward in range(6):
         share = math.comb(10, forward) * math.comb(10, 5 - forward) / math.comb(20, 5)
-        tolerance = 4 * math.sqrt(share * (1 - share) / (3 * SEEDS))
-        assert counts[forward] / (3 * SEEDS) == pytest.approx(share, abs=tolerance)
+        tolerance = 4 * math.sqrt(share * (1 - share) / (3 * len(over_sessions)))
+        assert counts[forward] / (3 * len(over_sessions)) == pytest.approx(share, abs=tolerance)
 
 
 def test_a_random_order_meets_all_six_orders_of_methods_as_often(over_sessions: list[Facts]) -> None:
     orders = Counter(plan.methods for plan in over_sessions)
     assert set(orders) == set(permutations(METHODS))
-    assert sum((count - SEEDS / 6) ** 2 for count in orders.values()) / (SEEDS / 6) < 25.74
+    expected = len(over_sessions) / 6
+    assert sum((count - expected) ** 2 for count in orders.values()) / expected < 25.74
 
 
 def test_balance_over_sets_leaves_the_order_of_methods_as_it_is(
@@ -226,7 +232,7 @@ def test_balance_over_sets_leaves_the_order_of_methods_as_it_is(
 
 def test_sessions_have_directions_of_their_own(over_sessions: list[Facts]) -> None:
     alike = sum(plan.forward[0] == plan.forward[1] for plan in over_sessions)
-    assert alike < SEEDS / 10
+    assert alike < len(over_sessions) / 10
 
 
 def test_the_same_seed_and_participant_make_the_same_plan_and_others_another() -> None:

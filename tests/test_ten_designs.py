@@ -71,8 +71,9 @@ def means(name, question, key, count=60):
     return {level: statistics.fmean(values) for level, values in found.items()}
 
 
-def test_rates_are_met_in_the_mean_over_people():
-    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), 250)
+@pytest.mark.parametrize("count", [250, pytest.param(1000, marks=pytest.mark.soak)])
+def test_rates_are_met_in_the_mean_over_people(count):
+    found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), count)
     assert found["vibration", "forward"] == pytest.approx(0.557, abs=0.03)
     assert found["asymmetric-2", "backward"] == pytest.approx(0.929, abs=0.02)
 
