@@ -47,7 +47,7 @@ def study_of(folder: Path, right: Any, methods: tuple[str, ...] = METHODS, *, ti
     """
     for i, counts in enumerate(right):
         code = f"P{i + 1:02d}"
-        rows = trial_rows(code, methods=methods)
+        rows = trial_rows(code, seed=i + 1, methods=methods)
         for method, count in zip(methods, counts, strict=True):
             for direction, share in (("forward", int(count)), ("backward", 5)):
                 chosen = [r for r in rows if r["method"] == method and r["direction"] == direction]
