@@ -94,7 +94,7 @@ def write_study(folder: Path, participants: int = 14, seed: int = 1) -> Path:
 
 def write_many(folder: Path, participants: int) -> Path:
     """Direction trials of so many participants with every column that a run fills in, each its own answers."""
-    start = datetime(2026, 11, 21, 9, tzinfo=UTC)
+    start = datetime(2024, 11, 21, 9, tzinfo=UTC)
     for i in range(1, participants + 1):
         rng = np.random.default_rng(i)
         rows = trial_rows(f"P{i:05d}", i)

@@ -125,7 +125,8 @@ def doubles_among(some: Iterable[ToldRows], numbers: Iterable[int]) -> list[Doub
     if told is None:
         return []
     found: dict[int, Double] = {}
-    for double in (*_written_often(told), *_alike(told), *_stretches(told)):
+    slices = _slices(told)
+    for double in (*_written_often(told, slices), *_alike(told, slices), *_stretches(told, slices)):
         found.setdefault(double.second, double)
     return [found[number] for number in sorted(found)]
 
@@ -204,11 +205,11 @@ def _slices(told: ToldRows) -> list[slice]:
     return [slice(end - count, end) for end, count in zip(ends, told.rows.tolist(), strict=True)]
 
 
-def _written_often(told: ToldRows) -> Iterator[Double]:
+def _written_often(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
     """Logs that are one block several times over, or each row; those in the same way are judged together."""
     by_way: dict[tuple[int, bool], list[tuple[float, Double]]] = {}
     row = told.row
-    for number, rows in zip(told.number.tolist(), _slices(told), strict=True):
+    for number, rows in zip(told.number.tolist(), slices, strict=True):
         way = _way(row[rows])
         if way is not None:
             often, blocks = way
@@ -238,10 +239,9 @@ def _timed(told: ToldRows, rows: slice) -> bool:
     return bool((told.time_ms[rows] >= 0).any())
 
 
-def _alike(told: ToldRows) -> Iterator[Double]:
+def _alike(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
     """Whole logs that are the same."""
     row, first = told.row, dict[bytes, int]()
-    slices = _slices(told)
     for place, rows in enumerate(slices):
         before = first.setdefault(row[rows].tobytes(), place)
         if before != place and _is_rare(told, rows, rows):
@@ -249,7 +249,7 @@ def _alike(told: ToldRows) -> Iterator[Double]:
             yield Double(first=one, second=other, whole=True, timed=_timed(told, rows))
 
 
-def _stretches(told: ToldRows) -> Iterator[Double]:
+def _stretches(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
     """Stretches of rows with times that stand anywhere else as well."""
     starts, hashes = _windows(told)
     order = np.argsort(hashes, kind="stable")
@@ -257,7 +257,7 @@ def _stretches(told: ToldRows) -> Iterator[Double]:
     leads = starts[order][np.flatnonzero(new)[np.cumsum(new) - 1]]
     copies = np.flatnonzero(~new)
     pairs = np.stack([leads[copies], starts[order][copies]], axis=1)
-    place, slices = told.place, _slices(told)
+    place = told.place
     begins, seen = np.cumsum(told.rows) - told.rows, set[tuple[int, int]]()
     for one, other in pairs[np.argsort(pairs[:, 1], kind="stable")].tolist():
         both = int(place[one]), int(place[other])
