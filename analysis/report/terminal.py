@@ -38,6 +38,12 @@ ColumnsOption = Annotated[
 IncludeSyntheticOption = Annotated[
     bool, typer.Option("--include-synthetic", help="Synthetic data beside real ones too; the two are kept apart.")
 ]
+RulesOption = Annotated[
+    Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants to leave out.")
+]
+RequestsOption = Annotated[
+    Path | None, typer.Option(metavar="REQUESTS.toml", help="Further tests and models, such as planned contrasts.")
+]
 WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores unless given.")]
 
 

@@ -77,21 +77,25 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
         for name in names
         if (said := state(who, name))
     )
-    kinds = Counter((run.experiment, run.kind) for _, run in runs)
+    kinds = Counter[tuple[str, str]]((run.experiment, run.kind) for _, run in runs)
     counts = Counter((one.experiment, one.state.partition(":")[0]) for one in absent)
     return Participation(
-        experiments={
-            name: PeopleOfExperiment(
-                analysed=len(within.get(name, ())),
-                left_out=counts[name, "left out"],
-                begun=counts[name, "begun"],
-                not_done=counts[name, "not done"],
-                practices=kinds[name, "practice"],
-                set_aside=kinds[name, "set aside"],
-            )
-            for name in names
-        },
+        experiments={name: _counted(name, len(within.get(name, ())), counts, kinds) for name in names},
         absent=absent,
+    )
+
+
+def _counted(
+    name: str, analysed: int, counts: Mapping[tuple[str, str], int], kinds: Mapping[tuple[str, str], int]
+) -> PeopleOfExperiment:
+    """How many people of an experiment are in which state, and how many runs of which kind there are."""
+    return PeopleOfExperiment(
+        analysed=analysed,
+        left_out=counts[name, "left out"],
+        begun=counts[name, "begun"],
+        not_done=counts[name, "not done"],
+        practices=kinds[name, "practice"],
+        set_aside=kinds[name, "set aside"],
     )
 
 

@@ -11,6 +11,8 @@ from analysis.report.terminal import (
     AsJsonOption,
     ColumnsOption,
     IncludeSyntheticOption,
+    RequestsOption,
+    RulesOption,
     end,
     progress,
     say,
@@ -59,12 +61,8 @@ def archive(
     out: Annotated[
         Path | None, typer.Option(metavar="ARCHIVE", help="Folder for the archive; STUDY-archive unless given.")
     ] = None,
-    rules: Annotated[
-        Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants the analysis leaves out.")
-    ] = None,
-    requests: Annotated[
-        Path | None, typer.Option(metavar="REQUESTS.toml", help="Further tests and models of the analysis.")
-    ] = None,
+    rules: RulesOption = None,
+    requests: RequestsOption = None,
     free_text: FreeTextOption = False,
     include_synthetic: IncludeSyntheticOption = False,
     as_json: AsJsonOption = False,

@@ -13,6 +13,8 @@ from analysis.report.terminal import (
     ColumnsOption,
     FixedSeedOption,
     IncludeSyntheticOption,
+    RequestsOption,
+    RulesOption,
     end,
     progress,
     say,
@@ -56,14 +58,10 @@ def analyze(
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Logs, or folders with logs.")],
     out: Annotated[Path, typer.Option(help="Folder for statistics, figures and report.")],
     columns: ColumnsOption = None,
-    rules: Annotated[
-        Path | None, typer.Option(metavar="RULES.toml", help="Which trials and participants to leave out.")
-    ] = None,
+    rules: RulesOption = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
     codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
-    requests: Annotated[
-        Path | None, typer.Option(metavar="REQUESTS.toml", help="Further tests and models, such as planned contrasts.")
-    ] = None,
+    requests: RequestsOption = None,
     fits: Annotated[bool, typer.Option("--fits", help="With the diffusion model fitted to response times.")] = False,
     include_synthetic: IncludeSyntheticOption = False,
     as_json: AsJsonOption = False,
