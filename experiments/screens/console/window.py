@@ -142,6 +142,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if self.controls is not None:
             self.controls.ended = True
         self.close_line()
+        self.refresh()  # at once: a window that is closed in this moment has said how it ended
         windows.play_tone()
 
     def _arrive(self) -> None:
