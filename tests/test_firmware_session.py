@@ -19,8 +19,10 @@ pytestmark = pytest.mark.slow
 def brief(folder: Path) -> None:
     """Experiment 2 with trains of a few shots and no waiting."""
     config = folder / "preference.toml"
-    text = re.sub(r"exposure_s = [\d.]+", "exposure_s = 6.0", config.read_text())
-    config.write_text(re.sub(r"\b(instruction|hand_over|rating|description)_s = [\d.]+", r"\1_s = 1.0", text))
+    text, times = re.subn(r"^(opening|hand_over|answer)_s = [\d.]+", r"\1_s = 1.0", config.read_text(), flags=re.M)
+    text, trains = re.subn(r"^stimulus_s = [\d.]+", "stimulus_s = 4.0", text, flags=re.M)
+    assert (times, trains) == (3, 1)
+    config.write_text(text)
 
 
 @pytest.mark.parametrize("name", ["direction", "preference"])
