@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
+from scipy.special import ndtr
 from scipy.stats import norm
 
 from experiments.design.procedures import posterior, psychometric
 from experiments.design.procedures.psychometric import Shape
-from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown, track_after
+from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown, track_after, track_of
 
 WIDE = LevelRange(low=-1e6, high=1e6)
 SHAPES: tuple[Shape, ...] = ("normal", "logistic", "gumbel", "reversed-gumbel")
@@ -119,12 +120,23 @@ def test_targets_are_those_of_the_books(down: int, up: int, ratio: float, target
 )
 def test_tracks_come_to_their_target(rule: UpDown | Kesten) -> None:
     """The level with that share on a cumulative normal: small steps stay near it."""
-    draws, answers = np.random.default_rng(17).random(600), list[bool]()
-    for value in draws:
-        level = track_after(rule, answers).next_level
-        assert level is not None
-        answers.append(bool(value < norm.cdf(level)))
-    assert np.mean(track_after(rule, answers).levels[200:]) == pytest.approx(norm.ppf(rule.target), abs=0.15)
+    stream = np.random.default_rng(17)
+    found = track_of(rule, lambda level: bool(stream.random() < ndtr(level)))
+    assert np.mean(found.levels[200:]) == pytest.approx(norm.ppf(rule.target), abs=0.15)
+
+
+@given(up_downs(), some_answers)
+def test_a_track_of_somebody_is_that_of_their_answers(rule: UpDown, answers: list[bool]) -> None:
+    """Somebody who answers so, trial by trial: the same track, and asked no oftener than it goes on."""
+    waiting, asked = list(answers), list[float]()
+
+    def answer(level: float) -> bool | None:
+        asked.append(level)
+        return waiting.pop(0) if waiting else None
+
+    found = track_of(rule, answer)
+    assert found == track_after(rule, answers)
+    assert tuple(asked) == (*found.levels, *(() if found.next_level is None else (found.next_level,)))
 
 
 # the posterior
@@ -150,7 +162,7 @@ def after(trials: list[tuple[int, bool]]) -> posterior.Shares:
 def by_hand(trials: list[tuple[int, bool]]) -> np.ndarray:
     """The posterior by its definition, trial by trial over all nodes."""
     threshold, width, lapse, guess = np.meshgrid(
-        KNOWN.thresholds, KNOWN.widths, KNOWN.lapses, KNOWN.guesses, indexing="ij"
+        *(KNOWN.axes[name] for name in ("threshold", "width", "lapse", "guess")), indexing="ij"
     )
     weights = KNOWN.prior.copy()
     for stimulus, right in trials:
@@ -220,6 +232,35 @@ def test_many_observers_at_once_are_each_their_own() -> None:
         assert rule.gains(many)[person] == pytest.approx(rule.gains(own), rel=1e-9)
 
 
+@given(some_trials, some.sampled_from(["threshold", "width", "lapse", "guess"]))
+def test_quantiles_are_those_of_the_marginal_with_each_value_spread_over_its_cell(
+    trials: list[tuple[int, bool]], name: str
+) -> None:
+    known, shares = after(trials), (0.025, 0.25, 0.5, 0.975)
+    found = KNOWN.quantiles(known, name, shares)
+    values, weights = KNOWN.axes[name], KNOWN.marginal(known, name)
+    middles = (values[1:] + values[:-1]) / 2
+    edges = [2 * values[0] - middles[0], *middles, 2 * values[-1] - middles[-1]]
+    assert weights == pytest.approx(
+        np.moveaxis(known.reshape(KNOWN.prior.shape), list(KNOWN.axes).index(name), 0).reshape(len(values), -1).sum(-1)
+    )
+    assert np.interp(found, edges, [0, *np.cumsum(weights)]) == pytest.approx(shares, abs=1e-9)
+    assert np.all(np.diff(found) >= 0)
+
+
+def test_a_parameter_with_one_value_has_it_as_every_quantile() -> None:
+    known = posterior.parameter_grid(
+        stimuli=np.array([0.0, 1.0]),
+        thresholds=np.array([0.0, 1.0]),
+        widths=np.array([2.0]),
+        lapses=np.array([0.0]),
+        guesses=np.array([0.5]),
+    )
+    many = np.broadcast_to(known.start(), (3, *known.shape))
+    assert known.quantiles(many, "width").tolist() == [[2.0] * 3] * 3
+    assert known.quantiles(many, "threshold", (0.5,)).tolist() == [[0.5]] * 3
+
+
 def test_of_stimuli_that_are_alike_the_first_is_taken() -> None:
     assert posterior.best_stimulus(np.array([[1.0, 2.0, 2.0 + 1e-13], [3.0, 1.0, 0.0]])).tolist() == [1, 0]
     assert posterior.best_stimulus(np.zeros(4)) == 0
@@ -230,9 +271,9 @@ def test_a_prior_that_is_none_is_refused(prior: np.ndarray) -> None:
     with pytest.raises(ValueError, match="prior: it must have the shape"):
         posterior.parameter_grid(
             stimuli=KNOWN.stimuli,
-            thresholds=KNOWN.thresholds,
-            widths=KNOWN.widths,
-            lapses=KNOWN.lapses,
-            guesses=KNOWN.guesses,
+            thresholds=KNOWN.axes["threshold"],
+            widths=KNOWN.axes["width"],
+            lapses=KNOWN.axes["lapse"],
+            guesses=KNOWN.axes["guess"],
             prior=prior,
         )

@@ -1,8 +1,9 @@
 """What is known of a psychometric function after some answers, and which stimulus tells most of it next.
 
-A grid over threshold, width, lapse rate and guess rate holds the posterior. It is multiplied by the likelihood of each
-answer, so that it depends on the stimuli and answers so far alone. Arrays may have axes in front for many observers at
-once: one copy of the arithmetic serves the session and its simulation.
+A grid over the parameters (threshold, width, lapse rate and guess rate; `surface` has one for two dimensions) holds the
+posterior. It is multiplied by the likelihood of each answer, so that it depends on the stimuli and answers so far
+alone. Arrays may have axes in front for many observers at once: one copy of the arithmetic serves the session and its
+simulation.
 
 The variance rule takes the stimulus with the least expected posterior variance of what is wanted (threshold, width, or
 both in units of their prior), all else marginalised: Kontsevich and Tyler's Psi (1999) with another loss, as in
@@ -12,6 +13,7 @@ Prins' psi-marginal (2013). The entropy rule takes the one whose answer tells mo
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,18 +30,14 @@ _LEAST = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ParameterGrid:
-    """The parameters' values with their prior, and the stimuli.
+class AnswerGrid:
+    """How stimuli are answered at each place of a grid of parameters, and how likely the places are to begin with.
 
-    `prior` has the shape (thresholds, widths, lapses, guesses) and sums to 1. `felt` is F, of the shape
-    (stimuli, thresholds × widths); `chance` and `slack` are g and 1 - g - l, of lapses × guesses.
+    `prior` has an axis a parameter, in the order of `axes`, lapse and guess rates last, and sums to 1. `felt` is F, of
+    the shape (stimuli, places of all but the rates); `chance` and `slack` are g and 1 - g - l, of lapses × guesses.
     """
 
-    stimuli: Shares
-    thresholds: Shares
-    widths: Shares
-    lapses: Shares
-    guesses: Shares
+    axes: Mapping[str, Shares]
     prior: Shares
     felt: Shares
     chance: Shares
@@ -47,17 +45,47 @@ class ParameterGrid:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The posterior's axes: thresholds × widths, lapses × guesses."""
+        """The posterior's axes: places of all but the rates, lapses × guesses."""
         return self.felt.shape[1], len(self.slack)
-
-    def values(self, wanted: WantedParameter) -> Shares:
-        """A parameter's value at each place of thresholds × widths."""
-        grid = np.meshgrid(self.thresholds, self.widths, indexing="ij")
-        return np.asarray(grid[wanted == "width"]).ravel()
 
     def start(self) -> Shares:
         """The prior, with a posterior's axes."""
         return self.prior.reshape(self.shape)
+
+    def marginal(self, posterior: Shares, name: str) -> Shares:
+        """How likely each value of a parameter is, whatever the others are: (..., its values)."""
+        front, place = posterior.ndim - 2, list(self.axes).index(name)
+        others = tuple(front + axis for axis in range(self.prior.ndim) if axis != place)
+        return np.asarray(posterior.reshape(*posterior.shape[:-2], *self.prior.shape).sum(axis=others))
+
+    def quantiles(self, posterior: Shares, name: str, shares: Sequence[float] = (0.025, 0.5, 0.975)) -> Shares:
+        """The values of a parameter below which it lies with these probabilities: (..., shares).
+
+        A value's weight is spread evenly over its cell, which goes halfway to its neighbours.
+        """
+        weights, values = self.marginal(posterior, name), self.axes[name]
+        if len(values) == 1:
+            return np.full((*weights.shape[:-1], len(shares)), values[0])
+        middles = (values[1:] + values[:-1]) / 2
+        edges = np.concatenate([[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]])
+        passed = np.cumsum(weights, axis=-1)
+        wanted = np.asarray(shares) * passed[..., -1:]
+        cell = (passed[..., None] < wanted[..., None, :]).sum(axis=-2)
+        own = np.take_along_axis(weights, cell, axis=-1)
+        missing = np.take_along_axis(passed, cell, axis=-1) - wanted
+        return np.asarray(edges[cell + 1] - (edges[cell + 1] - edges[cell]) * missing / np.where(own > 0, own, 1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ParameterGrid(AnswerGrid):
+    """A grid of threshold, width, lapse and guess rate, and the stimuli (levels,)."""
+
+    stimuli: Shares
+
+    def values(self, wanted: WantedParameter) -> Shares:
+        """A parameter's value at each place of thresholds × widths."""
+        grid = np.meshgrid(self.axes["threshold"], self.axes["width"], indexing="ij")
+        return np.asarray(grid[wanted == "width"]).ravel()
 
 
 def parameter_grid(
@@ -71,27 +99,36 @@ def parameter_grid(
     shape: Shape = "normal",
 ) -> ParameterGrid:
     """A grid; without a prior every place has the same. `ValueError`: a prior of another shape, or of nothing."""
-    sizes = (len(thresholds), len(widths), len(lapses), len(guesses))
-    weights = np.ones(sizes) if prior is None else np.asarray(prior, float)
-    if weights.shape != sizes or not np.all(weights >= 0) or not weights.sum() > 0:
-        raise ValueError(f"prior: it must have the shape {sizes}, no value below 0, and one above")
+    axes = {"threshold": thresholds, "width": widths, "lapse": lapses, "guess": guesses}
     places = np.meshgrid(thresholds, widths, indexing="ij")
-    lapse, guess = (axis.ravel() for axis in np.meshgrid(lapses, guesses, indexing="ij"))
+    levels = np.asarray(stimuli, float)
+    chance, slack = chance_and_slack(lapses, guesses)
     return ParameterGrid(
-        stimuli=np.asarray(stimuli, float),
-        thresholds=np.asarray(thresholds, float),
-        widths=np.asarray(widths, float),
-        lapses=np.asarray(lapses, float),
-        guesses=np.asarray(guesses, float),
-        prior=weights / weights.sum(),
-        felt=share_felt(np.asarray(stimuli, float)[:, None], places[0].ravel(), places[1].ravel(), shape),
-        chance=guess,
-        slack=1 - guess - lapse,
+        stimuli=levels,
+        axes={name: np.asarray(values, float) for name, values in axes.items()},
+        prior=checked_prior(prior, tuple(map(len, axes.values()))),
+        felt=share_felt(levels[:, None], places[0].ravel(), places[1].ravel(), shape),
+        chance=chance,
+        slack=slack,
     )
 
 
+def checked_prior(prior: Shares | None, sizes: tuple[int, ...]) -> Shares:
+    """The prior with the sum 1, the same everywhere if there is none. `ValueError`: another shape, or of nothing."""
+    weights = np.ones(sizes) if prior is None else np.asarray(prior, float)
+    if weights.shape != sizes or not np.all(weights >= 0) or not weights.sum() > 0:
+        raise ValueError(f"prior: it must have the shape {sizes}, no value below 0, and one above")
+    return np.asarray(weights / weights.sum())
+
+
+def chance_and_slack(lapses: Shares, guesses: Shares) -> tuple[Shares, Shares]:
+    """What is right by chance, g, and what F adds to it, 1 - g - l, of lapses × guesses."""
+    lapse, guess = (axis.ravel() for axis in np.meshgrid(lapses, guesses, indexing="ij"))
+    return guess, 1 - guess - lapse
+
+
 def posterior_after(
-    known: ParameterGrid, posterior: Shares, stimulus: NDArray[np.intp] | int, right: NDArray[np.bool_] | bool
+    known: AnswerGrid, posterior: Shares, stimulus: NDArray[np.intp] | int, right: NDArray[np.bool_] | bool
 ) -> Shares:
     """The posterior after an answer to a stimulus, given by its place. Axes in front: one stimulus and answer each."""
     share = known.chance + known.slack * known.felt[stimulus][..., None]
@@ -118,7 +155,7 @@ class VarianceRule:
         known = self.known
         felt, guessed = posterior @ known.slack, posterior @ known.chance
         products = felt @ self.matrix.T
-        parts = products.reshape(*products.shape[:-1], len(self.values) + 1, len(known.stimuli))
+        parts = products.reshape(*products.shape[:-1], len(self.values) + 1, len(known.felt))
         right = guessed.sum(-1)[..., None] + parts[..., 0, :]
         right_t = (guessed @ self.values.T)[..., None] + parts[..., 1:, :]
         all_t = (posterior.sum(-1) @ self.values.T)[..., None]
@@ -144,9 +181,9 @@ def variance_rule(known: ParameterGrid, wanted: tuple[WantedParameter, ...] = ("
 class EntropyRule:
     """The stimulus whose answer tells most: h(mean share) - mean h(share), h the entropy of a yes or no."""
 
-    known: ParameterGrid
+    known: AnswerGrid
     doubt: Shares
-    """h(P) at each place of the grid, of the shape (stimuli, thresholds × widths × lapses × guesses)."""
+    """h(P) at each place of the grid, of the shape (stimuli, all places of the grid)."""
 
     def gains(self, posterior: Shares) -> Shares:
         """What each answer is expected to tell, in nats, of the shape (..., stimuli)."""
@@ -157,10 +194,10 @@ class EntropyRule:
         return np.asarray(_doubt(right) - flat @ self.doubt.T)
 
 
-def entropy_rule(known: ParameterGrid) -> EntropyRule:
+def entropy_rule(known: AnswerGrid) -> EntropyRule:
     """The rule for a grid."""
     share = known.chance + known.slack * known.felt[..., None]
-    return EntropyRule(known, np.ascontiguousarray(_doubt(share).reshape(len(known.stimuli), -1)))
+    return EntropyRule(known, np.ascontiguousarray(_doubt(share).reshape(len(known.felt), -1)))
 
 
 def _doubt(share: Shares) -> Shares:

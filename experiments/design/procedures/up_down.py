@@ -6,7 +6,7 @@ Transformed (n up, m down; Levitt 1971), weighted (Kaernbach 1991), and accelera
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 _HALVINGS = 60
@@ -129,14 +129,24 @@ def track_after(rule: UpDown | Kesten, answers: Iterable[bool]) -> TrackState:
     >>> track_after(rule, [True, True, False])
     TrackState(next_level=5.0, levels=(8.0, 6.0, 4.0), reversals=(4.0,), at_edge=False)
     """
+    given = iter(answers)
+    return track_of(rule, lambda _: next(given, None))
+
+
+def track_of(rule: UpDown | Kesten, answer: Callable[[float], bool | None]) -> TrackState:
+    """The track of somebody who answers each level so: right or not, `None` when there is no answer yet.
+
+    >>> rule = UpDown(start=8.0, steps=(1.0,), within=LevelRange(low=0, high=9), stop=TrackEnd(trials=6))
+    >>> track_of(rule, lambda level: level > 5).levels
+    (8.0, 7.0, 6.0, 5.0, 6.0, 5.0)
+    """
     walk = _Walk(rule.within.kept(rule.start))
-    for right in answers:
-        if rule.stop.reached(len(walk.levels), len(walk.reversals)):
+    while not (over := rule.stop.reached(len(walk.levels), len(walk.reversals))):
+        if (right := answer(walk.level)) is None:
             break
         walk.levels.append(walk.level)
         step = walk.up_down(rule, right=right) if isinstance(rule, UpDown) else walk.kesten(rule, right=right)
         walk.go(rule.within, step)
-    over = rule.stop.reached(len(walk.levels), len(walk.reversals))
     return TrackState(
         next_level=None if over else walk.level,
         levels=tuple(walk.levels),
