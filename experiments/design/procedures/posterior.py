@@ -131,8 +131,9 @@ def posterior_after(
     known: AnswerGrid, posterior: Shares, stimulus: NDArray[np.intp] | int, right: NDArray[np.bool_] | bool
 ) -> Shares:
     """The posterior after an answer to a stimulus, given by its place. Axes in front: one stimulus and answer each."""
-    share = known.chance + known.slack * known.felt[stimulus][..., None]
-    likely = posterior * np.where(np.asarray(right)[..., None, None], share, 1 - share)
+    said = np.asarray(right)[..., None]
+    chance, slack = np.where(said, known.chance, 1 - known.chance), np.where(said, known.slack, -known.slack)
+    likely = posterior * (chance[..., None, :] + slack[..., None, :] * known.felt[stimulus][..., None])
     total = likely.sum(axis=(-2, -1), keepdims=True)
     return likely / np.where(total > 0, total, 1.0)
 
