@@ -566,12 +566,12 @@ _JOURNALS: tuple[_Told, ...] = (
     (
         "the whole folder again, as a backup",
         in_folder(lambda folder: shutil.copytree(folder, folder / "the-backup")),
-        "holds what ../../sub-P01/sub-P01_task-preference_ratings.csv holds, byte for byte (rule: a run counts once)",
+        "holds what sub-P01/sub-P01_task-preference_ratings.csv holds, byte for byte (rule: a run counts once)",
     ),
     (
         "a log copied under another code",
         in_folder(copied_log),
-        "holds what the log of participant P01 in ../sub-P01/sub-P01_task-direction_trials.csv holds: all that was",
+        "holds what the log of participant P01 in sub-P01/sub-P01_task-direction_trials.csv holds: all that was",
     ),
     ("a table edited after its run", in_folder(edit(",1,", ",2,")), "edited since the run; `recoil rebuild"),
     (

@@ -59,7 +59,7 @@ def of_designs(*names: str) -> Logs:
     for name in names:
         config, laws = loaded(name)
         designs.append(DesignLogs(design=config, table=simulated(config, laws, 8), gun_labels={}))
-    return Logs(trials=empty, ratings=empty, files=(), problems=(), designs=tuple(designs))
+    return Logs(trials=empty, ratings=empty, paths=(), problems=(), designs=tuple(designs))
 
 
 def asked(tmp_path: Path, text: str, logs: Logs) -> tuple[Requested, ...]:

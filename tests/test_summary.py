@@ -196,7 +196,7 @@ def _crowd(participants: int) -> Logs:
             "gun": pd.Categorical(["simulated"] * (3 * participants)),
         }
     )
-    return Logs(trials=trials, ratings=ratings, problems=(), files=())
+    return Logs(trials=trials, ratings=ratings, problems=(), paths=())
 
 
 def test_a_thousand_participants_are_counted() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,8 @@ from analysis.logs.files import (
     Problem,
     code_in_name,
     experiment_in_name,
+    results_above,
+    seen_from,
 )
 from analysis.logs.journals import RunFile
 from analysis.logs.kinds import IN_REGISTER, kept_out, kinds_of
@@ -38,10 +39,14 @@ class WaitingFile:
     """A file, its number, the folder that stands for its study, and its content, or why there is none."""
 
     number: int
-    file: Path
     path: str
     study: str
     content: bytes | BadLogError
+
+    @property
+    def file(self) -> Path:
+        """The same as a path: of ten thousand, few are asked for."""
+        return Path(self.path)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -85,11 +90,11 @@ class LogsSoFar:
     """Whose data each good log holds; None where nobody answered."""
     earlier: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
     """The logs of each study, experiment and code, upper and lower case alike."""
-    files: dict[int, Path] = field(default_factory=dict)
+    paths: dict[int, str] = field(default_factory=dict)
     """The files of good logs, numbered."""
     mapped: set[int] = field(default_factory=set)
     """The numbers of the logs that other programs wrote."""
-    contents: dict[int, Path] = field(default_factory=dict)
+    contents: dict[int, str] = field(default_factory=dict)
     """The file that first held each content."""
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
     """Who stands in the register of each results folder."""
@@ -138,16 +143,16 @@ class LogsSoFar:
 
     def admit(self, number: int, one: WaitingFile, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""
-        results = one.path.rpartition(os.sep)[0].rpartition(os.sep)[0] or str(one.file.parent.parent)
-        reason = self.known(results).get(log.code, Member(participant_id=log.code)).excluded
-        if reason is not None:
+        results = results_above(one.path) or str(one.file.parent.parent)
+        member = self.known(results).get(log.code)
+        if member is not None and (reason := member.excluded) is not None:
             how = f"`recoil study DIR --readmit {log.code} --reason TEXT`"
             said = f"participant {log.code} is excluded: {reason} ({how} readmits them)"
             raise BadLogError(f"{said} (rule: {IN_REGISTER})")
         self._check_new(study, log, number)
         self._check_no_copy(one)
         self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
-        self.files[number // LOGS_A_FILE] = one.file
+        self.paths[number // LOGS_A_FILE] = one.path
 
     def known(self, results: str) -> Mapping[str, Member]:
         """Who stands in the register of a results folder, as far as it can be read; what cannot is a problem."""
@@ -166,7 +171,7 @@ class LogsSoFar:
             there = self.codes[first]
             name = f"participant {log.code!r}" if log.code == there else f"participant {log.code!r} (there {there!r})"
             rule = "(rule: one log a participant and experiment, upper and lower case alike)"
-            message = f"{name} has a {log.experiment} log already in {self.files[first // LOGS_A_FILE]} {rule}"
+            message = f"{name} has a {log.experiment} log already in {self.paths[first // LOGS_A_FILE]} {rule}"
             raise BadLogError(message, None, "participant_id")
         earlier.append(number)
 
@@ -174,9 +179,9 @@ class LogsSoFar:
         """`BadLogError`: the same table, with onsets to the µs, stood elsewhere, as in a copy of the folder."""
         if not isinstance(one.content, bytes) or not _ONSET.search(one.content):
             return
-        same = self.contents.setdefault(hash(one.content), one.file)
-        if same != one.file:
-            where = os.path.relpath(same, one.file.parent)
+        same = self.contents.setdefault(hash(one.content), one.path)
+        if same != one.path:
+            where = seen_from(same, one.path)
             raise BadLogError(f"holds what {where} holds, byte for byte (rule: a run counts once); read one of both")
 
     def leave_copies(self) -> None:
@@ -189,12 +194,12 @@ class LogsSoFar:
 
     def _seen_from(self, number: int, other: int) -> str:
         """What the person of a log is called in what is said of another."""
-        return other_log(self.codes[number], self.files[number // LOGS_A_FILE], self.files[other // LOGS_A_FILE])
+        return other_log(self.codes[number], self.paths[number // LOGS_A_FILE], self.paths[other // LOGS_A_FILE])
 
     def _leave(self, number: int, said: str) -> None:
         """Leave out a log that was admitted."""
         if number in self.studies:
-            file, study = self.files[number // LOGS_A_FILE], self.studies.pop(number)
+            file, study = Path(self.paths[number // LOGS_A_FILE]), self.studies.pop(number)
             self.problems.append(BadLogError(said).of(file, self.codes[number], self.experiments[number], study))
 
     def keep_out(self, first: DataKind) -> None:

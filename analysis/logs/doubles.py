@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.logs.measures import MEASURES
-from analysis.logs.texts import Block, Coded
+from analysis.logs.texts import Block, Coded, rows_of_logs
 from analysis.stats.arrays import BoolArray, FloatArray
 from experiments.design.config import DesignConfig
 
@@ -47,12 +47,6 @@ class ToldRows:
     asked: _Hashes
     answer: _Hashes
     time_ms: NDArray[np.int64]
-
-    @property
-    def row(self) -> _Hashes:
-        """A number for each row: the same for the same."""
-        found: _Hashes = self.asked * _MIX[0] + self.answer * _MIX[1] + self.time_ms.astype(np.uint64) * _MIX[2]
-        return found
 
     @property
     def place(self) -> NDArray[np.intp]:
@@ -121,28 +115,43 @@ def _hash(text: str) -> int:
 
 def doubles_among(some: Iterable[ToldRows], numbers: Iterable[int]) -> list[Double]:
     """The doubles among logs of one experiment with these numbers; each log once, with the first that it is like."""
-    told = _chosen([*some], set(numbers))
-    if told is None:
+    every = _chosen([*some], numbers)
+    if every is None:
         return []
     found: dict[int, Double] = {}
-    slices = _slices(told)
-    for double in (*_written_often(told, slices), *_alike(told, slices), *_stretches(told, slices)):
+    for double in (*_written_often(every), *_alike(every), *_stretches(every)):
         found.setdefault(double.second, double)
     return [found[number] for number in sorted(found)]
 
 
-def _chosen(some: Sequence[ToldRows], numbers: set[int]) -> ToldRows | None:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Together:
+    """What logs tell, where each begins, and a number for each row: the same for the same."""
+
+    told: ToldRows
+    begins: NDArray[np.int64]
+    row: _Hashes
+
+    def rows(self, place: int) -> slice:
+        """The rows of the log at a place."""
+        begin = int(self.begins[place])
+        return slice(begin, begin + int(self.told.rows[place]))
+
+
+def _chosen(some: Sequence[ToldRows], numbers: Iterable[int]) -> _Together | None:
     """All these logs together, in the order of their numbers."""
     if not some:
         return None
     number, rows = (np.concatenate([getattr(one, name) for one in some]) for name in ("number", "rows"))
-    first = np.cumsum(rows) - rows
-    order = np.array([at for at in np.argsort(number).tolist() if int(number[at]) in numbers], dtype=np.intp)
+    order = np.argsort(number)
+    order = order[np.isin(number[order], np.fromiter(numbers, dtype=np.int64))]
     if not order.size:
         return None
-    at = np.concatenate([np.arange(first[one], first[one] + rows[one]) for one in order.tolist()])
+    at = rows_of_logs(order, rows)
     cells = {name: np.concatenate([getattr(one, name) for one in some])[at] for name in ("asked", "answer", "time_ms")}
-    return ToldRows(number=number[order], rows=rows[order], **cells)
+    told = ToldRows(number=number[order], rows=rows[order], **cells)
+    row = told.asked * _MIX[0] + told.answer * _MIX[1] + told.time_ms.astype(np.uint64) * _MIX[2]
+    return _Together(told=told, begins=np.cumsum(told.rows) - told.rows, row=row)
 
 
 def _surprise(told: ToldRows, rows: slice, copied: slice) -> float:
@@ -200,17 +209,20 @@ def _is_rare(told: ToldRows, rows: slice, copied: slice) -> bool:
     return _surprise(told, rows, copied) > math.log(ODDS)
 
 
-def _slices(told: ToldRows) -> list[slice]:
-    ends = np.cumsum(told.rows).tolist()
-    return [slice(end - count, end) for end, count in zip(ends, told.rows.tolist(), strict=True)]
+def _several_times(values: _Hashes) -> BoolArray:
+    """Which values are there more than once; sorted bare, as nearly always none is."""
+    in_order = np.sort(values)
+    found: BoolArray = np.isin(values, np.unique(in_order[1:][in_order[1:] == in_order[:-1]]))
+    return found
 
 
-def _written_often(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
+def _written_often(every: _Together) -> Iterator[Double]:
     """Logs that are one block several times over, or each row; those in the same way are judged together."""
     by_way: dict[tuple[int, bool], list[tuple[float, Double]]] = {}
-    row = told.row
-    for number, rows in zip(told.number.tolist(), slices, strict=True):
-        way = _way(row[rows])
+    told = every.told
+    for place in np.flatnonzero(_begins_again(every)).tolist():
+        rows, number = every.rows(place), int(told.number[place])
+        way = _way(every.row[rows])
         if way is not None:
             often, blocks = way
             part = (rows.stop - rows.start) // often
@@ -222,6 +234,15 @@ def _written_often(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
     for some in by_way.values():
         if sum(surprise for surprise, _ in some) > math.log(ODDS):
             yield from (double for _, double in some)
+
+
+def _begins_again(every: _Together) -> BoolArray:
+    """The logs whose first row is their second too, or begins a later part; all that are written often are of these."""
+    rows, first = every.told.rows, every.row[every.begins]
+    found = first == every.row[every.begins + (rows > 1)]
+    for often in _OFTEN:
+        found |= first == every.row[every.begins + rows // often]
+    return found
 
 
 def _way(row: _Hashes) -> tuple[int, bool] | None:
@@ -239,46 +260,58 @@ def _timed(told: ToldRows, rows: slice) -> bool:
     return bool((told.time_ms[rows] >= 0).any())
 
 
-def _alike(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
+def _alike(every: _Together) -> Iterator[Double]:
     """Whole logs that are the same."""
-    row, first = told.row, dict[bytes, int]()
-    for place, rows in enumerate(slices):
-        before = first.setdefault(row[rows].tobytes(), place)
+    first = dict[bytes, int]()
+    told = every.told
+    for place in np.flatnonzero(_several_times(np.add.reduceat(every.row, every.begins))).tolist():
+        rows = every.rows(place)
+        before = first.setdefault(every.row[rows].tobytes(), place)
         if before != place and _is_rare(told, rows, rows):
             one, other = int(told.number[before]), int(told.number[place])
             yield Double(first=one, second=other, whole=True, timed=_timed(told, rows))
 
 
-def _stretches(told: ToldRows, slices: Sequence[slice]) -> Iterator[Double]:
+def _stretches(every: _Together) -> Iterator[Double]:
     """Stretches of rows with times that stand anywhere else as well."""
-    starts, hashes = _windows(told)
-    order = np.argsort(hashes, kind="stable")
-    new = np.append(True, np.diff(hashes[order]) != 0)[: order.size]
-    leads = starts[order][np.flatnonzero(new)[np.cumsum(new) - 1]]
-    copies = np.flatnonzero(~new)
-    pairs = np.stack([leads[copies], starts[order][copies]], axis=1)
-    place = told.place
-    begins, seen = np.cumsum(told.rows) - told.rows, set[tuple[int, int]]()
-    for one, other in pairs[np.argsort(pairs[:, 1], kind="stable")].tolist():
-        both = int(place[one]), int(place[other])
-        if both not in seen and _is_rare(told, slices[both[1]], slice(other, other + STRETCH)):
+    seen, told = set[tuple[int, int]](), every.told
+    pairs = _same_windows(every)
+    places = np.searchsorted(every.begins, pairs, side="right") - 1
+    for rows, both in zip(pairs.tolist(), map(tuple, places.tolist()), strict=True):
+        if both not in seen and _is_rare(told, every.rows(both[1]), slice(rows[1], rows[1] + STRETCH)):
             seen.add(both)
-            at = one - int(begins[both[0]]) + 1, other - int(begins[both[1]]) + 1
-            yield Double(
-                first=int(told.number[both[0]]), second=int(told.number[both[1]]), whole=False, timed=True, at=at
-            )
+            one, other = (row - int(every.begins[place]) + 1 for row, place in zip(rows, both, strict=True))
+            first, second = (int(told.number[place]) for place in both)
+            yield Double(first=first, second=second, whole=False, timed=True, at=(one, other))
 
 
-def _windows(told: ToldRows) -> tuple[NDArray[np.intp], _Hashes]:
+def _same_windows(every: _Together) -> NDArray[np.intp]:
+    """Rows at which the same stretch begins: the first of all, and each later one, in the order of these."""
+    starts, hashes = _windows(every)
+    again = _several_times(hashes)
+    starts, hashes = starts[again], hashes[again]
+    _, first, of = np.unique(hashes, return_index=True, return_inverse=True)
+    pairs = np.stack([starts[first[of]], starts], axis=1)
+    return pairs[pairs[:, 0] != pairs[:, 1]]
+
+
+def _windows(every: _Together) -> tuple[NDArray[np.intp], _Hashes]:
     """Where stretches of answered rows with times begin, and a number for what each tells."""
-    full: BoolArray = (told.time_ms >= 0) & (told.answer != 0)
-    count = len(full) - STRETCH + 1
+    count = len(every.row) - STRETCH + 1
     if count < 1:
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.uint64)
-    before, place, row = np.append(0, np.cumsum(full)), told.place, told.row
+    before = np.append(0, np.cumsum((every.told.time_ms >= 0) & (every.told.answer != 0)))
+    place = every.told.place
     good = (before[STRETCH:] - before[:-STRETCH] == STRETCH) & (place[:count] == place[STRETCH - 1 :])
     starts = np.flatnonzero(good)
-    hashes = np.zeros(starts.size, dtype=np.uint64)
-    for step in range(STRETCH):
-        hashes = hashes * _MIX[0] + (row[starts + step] ^ (row[starts + step] >> np.uint64(29)))
-    return starts, hashes
+    return starts, _rolled(every.row ^ (every.row >> np.uint64(29)), STRETCH)[starts]
+
+
+def _rolled(row: _Hashes, count: int) -> _Hashes:
+    """Of each `count` rows in a row the polynomial that they are the coefficients of; a half is made once for both."""
+    if count == 1:
+        return row
+    half = _rolled(row, count // 2)
+    step = count // 2
+    both = half[:-step] * np.uint64(pow(int(_MIX[0]), step, 1 << 64)) + half[step:]
+    return both[:-1] * _MIX[0] + row[count - 1 :] if count % 2 else both

@@ -94,7 +94,7 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Foun
         top = _real(path if path.is_dir() else path.parent)
         for real, log in logs.items():
             found.setdefault(real, (log, _study(real, top)))
-    in_order = [log for _, log in sorted(found.items(), key=lambda one: one[0].split(os.sep))]  # noqa: PTH206 - many
+    in_order = [found[real] for real in sorted(found, key=_by_parts)]
     journals = {log: study for log, study in in_order if _is_journal(log)}
     logs_found = {log: study for log, study in in_order if log not in journals and _is_counted(log)}
     return FoundFiles(logs=logs_found, journals=journals, problems=tuple(problems))
@@ -105,13 +105,13 @@ _JOURNAL = re.compile(r"_journal(\.aside-[0-9]+)?\.jsonl$")
 
 
 def _is_journal(path: str) -> bool:
-    return _JOURNAL.search(path) is not None
+    return path.endswith(_JOURNALS) and _JOURNAL.search(path) is not None
 
 
 def _is_counted(path: str) -> bool:
     """Whether a file may hold data: a practice holds none, nor does a register."""
     name = _name(path).lower()
-    return "practice" not in name and (_is_journal(name) or not name.endswith(_JOURNALS))
+    return "practice" not in name and (not name.endswith(_JOURNALS) or _is_journal(name))
 
 
 def _real(path: Path) -> str:
@@ -136,6 +136,25 @@ def below(problem: Problem, shown: Path) -> str:
 
 def _name(path: str) -> str:
     return path.rpartition(os.sep)[2]
+
+
+def results_above(path: str) -> str:
+    """The folder that holds a log's own, empty where the path does not say.
+
+    >>> results_above("results/sub-P01/sub-P01_task-direction_trials.csv")
+    'results'
+    """
+    return path.rpartition(os.sep)[0].rpartition(os.sep)[0]
+
+
+def seen_from(path: str, beside: str) -> str:
+    """A file as it is seen from another one: below the folder that holds both, so no path says on which machine.
+
+    >>> seen_from("lab/results/sub-P01/log.csv", "lab/copy/sub-P01/log.csv")
+    'results/sub-P01/log.csv'
+    """
+    folders = [Path(one).absolute().parent for one in (path, beside)]
+    return os.path.relpath(path, os.path.commonpath(folders))
 
 
 def _study(real: str, top: str) -> str:
@@ -167,9 +186,14 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
             reason = f"cannot be read: {error.strerror or error}"
             problems.append(Problem(file=Path(place), line=None, column=None, message=reason))
     found: dict[str, str] = {}
-    for path, real in sorted(logs, key=lambda log: log[0].split(os.sep)):  # noqa: PTH206 - of many thousands
+    for path, real in sorted(logs, key=lambda log: _by_parts(log[0])):
         found.setdefault(real, path)
     return found
+
+
+def _by_parts(path: str) -> str:
+    """Paths in the order of their parts, as no part holds a null."""
+    return path.replace(os.sep, "\0")
 
 
 def _why_not_read(entry: os.DirEntry[str], endings: tuple[str, ...]) -> str:
@@ -212,7 +236,7 @@ LONGEST_LOG, LONGEST_MAPPED = 100_000, 400_000
 
 def check_length(content: bytes, most: int = LONGEST_LOG) -> None:
     """`BadLogError` for a file of more lines than are analysed while somebody waits."""
-    if content.count(b"\n") > most + 1:
+    if len(content) > most and content.count(b"\n") > most + 1:
         raise BadLogError(f"has more than {most:,} rows (rule: at most so many in a file)")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from experiments.session.history import answered
 from experiments.study.folders import data_of
 
 RunKind = Literal["run", "practice", "set aside"]
-_TABLE = re.compile(rf"(_({'|'.join({*FILE_SUFFIX.values()})}))?\.[^.]*$")
+_SUFFIXES = tuple(f"_{suffix}" for suffix in FILE_SUFFIX.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,13 +70,18 @@ def run_file(path: str, study: str) -> RunFile | None:
 
 def journal_of(path: str) -> str:
     """The journal that belongs beside a table; a journal itself."""
-    return path if path.endswith(journal.ENDING) else f"{_TABLE.sub('', path)}{journal.ENDING}"
+    if path.endswith(journal.ENDING):
+        return path
+    stem = path.rpartition(".")[0] if "." in path else path
+    suffix = next((one for one in _SUFFIXES if stem.endswith(one)), "")
+    return f"{stem.removesuffix(suffix)}{journal.ENDING}"
 
 
 def without_table(runs: Iterable[RunFile], tables: Iterable[str]) -> list[RunFile]:
     """The runs, neither practices nor set aside, whose table is not among these."""
-    there = {journal_of(path) for path in tables}
-    return [run for run in runs if run.kind == "run" and run.path not in there]
+    of_runs = [run for run in runs if run.kind == "run"]
+    there = {journal_of(path) for path in tables} if of_runs else set[str]()
+    return [run for run in of_runs if run.path not in there]
 
 
 def made_again(run: RunFile) -> bytes | BegunRun:

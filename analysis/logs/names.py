@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
-from analysis.logs.files import experiment_in_name
+from analysis.logs.files import experiment_in_name, results_above
 from analysis.logs.journals import journal_of
 from experiments.design.language import METHOD_FACTOR, shown_level
 from experiments.rebuild import began_with
@@ -55,27 +55,27 @@ def gun_labels(head: Head) -> dict[str, str]:
     return {name: label for name, label in labels.items() if isinstance(label, str)}
 
 
-def names_beside(files: Iterable[Path], methods: Iterable[str], known: MethodNames) -> MethodNames:
+def names_beside(paths: Iterable[str], methods: Iterable[str], known: MethodNames) -> MethodNames:
     """`known`, and what journals beside the logs say: one of each results folder and experiment, more if need be."""
-    wanted, names, others = set(methods), known, list[Path]()
-    seen = set[tuple[Path, str]]()
-    for file in files:
-        where = (file.parent.parent, experiment_in_name(file.name))
+    wanted, names, others = set(methods), known, list[str]()
+    seen = set[tuple[str, str]]()
+    for path in paths:
+        where = (results_above(path), experiment_in_name(path))
         if where in seen:
-            others.append(file)
+            others.append(path)
         else:
             seen.add(where)
-            names = names.and_then(_names_beside(file))
-    for file in islice(others, _LOOKED_AT):
+            names = names.and_then(_names_beside(path))
+    for path in islice(others, _LOOKED_AT):
         if wanted <= set(names.order):
             break
-        names = names.and_then(_names_beside(file))
+        names = names.and_then(_names_beside(path))
     return names
 
 
-def _names_beside(file: Path) -> MethodNames:
+def _names_beside(log: str) -> MethodNames:
     """What the journal beside a log says; nothing where there is none that can be read."""
-    path = Path(journal_of(str(file)))
+    path = Path(journal_of(log))
     try:
         head = journal.head(path) if path.is_file() else None
         return names_of_run(head) if head is not None else MethodNames()

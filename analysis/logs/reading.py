@@ -45,13 +45,14 @@ from experiments.study.study import Member
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
 
-_BATCH_BYTES = 4 << 20
-"""So much is checked at once: enough for speed, and little enough for the cache."""
+_BATCH_BYTES = 16 << 20
+"""So much is checked at once: of smaller pieces, handing them from thread to thread costs a fifth of the reading."""
 
 _BATCHES_AHEAD = 4
 """So many are read from disk while others are checked."""
 
-Track = Callable[[Sequence[Path]], Iterable[Path]]
+Track = Callable[[Sequence[str]], Iterable[str]]
+"""Is given the paths of the files and gives them back one by one, each as its reading begins."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +66,8 @@ class Logs:
     trials: pd.DataFrame
     ratings: pd.DataFrame
     problems: tuple[Problem, ...]
-    files: tuple[Path, ...]
+    paths: tuple[str, ...]
+    """The files that were read."""
     designs: tuple[DesignLogs, ...] = ()
     remarks: tuple[Problem, ...] = ()
     notes: tuple[Problem, ...] = ()
@@ -79,6 +81,11 @@ class Logs:
     """Short names of the studies' folders."""
     methods: MethodNames = field(default_factory=MethodNames)
     """The order of methods and what they are called in print."""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that were read."""
+        return tuple(map(Path, self.paths))
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -137,7 +144,7 @@ def read_logs(
     return replace(
         first,
         problems=tuple(sorted(reading.problems, key=_by_place)),
-        remarks=(*reading.remarks, *turned_round(first.trials, first.files)),
+        remarks=(*reading.remarks, *turned_round(first.trials, first.paths)),
         notes=tuple(all_gone(reading.proven.values())),
         begun=tuple(begun_of[kinds[0]]),
         runs=tuple(runs_of[kinds[0]]),
@@ -157,16 +164,16 @@ def _of_kind(
     studies = {number: names.get(study, study) for number, study in mine.items()}
     by_design = _by_design(reading, {number: log for number, log in designs.items() if number in mine}, studies)
     used = {number // LOGS_A_FILE for number in mine}
-    files = {number: file for number, file in reading.files.items() if number in used}
+    paths = {number: path for number, path in reading.paths.items() if number in used}
     trials, ratings = (joined(experiment, reading.blocks, studies) for experiment in tables.TABLES)
     methods = {str(method) for table in (trials, ratings) for method in table["method"].unique()}
     return Logs(
         trials=trials,
         ratings=ratings,
-        methods=names_beside(files.values(), methods, told),
+        methods=names_beside(paths.values(), methods, told),
         designs=by_design,
         problems=(),
-        files=tuple(files.values()),
+        paths=tuple(paths.values()),
         names={study: names.get(study, study) for study in mine.values()},
         kind=kind,
         mapped=not reading.mapped.isdisjoint(mine),
@@ -199,11 +206,9 @@ def _designed(
 ) -> dict[int, DesignLog]:
     """The good logs of designs, numbered behind the others."""
     logs: dict[int, DesignLog] = {}
-    files = zip(found.items(), track([Path(path) for path in found]), strict=True) if found else ()
-    for number, ((path, study), file) in enumerate(files, start=first):
-        waiting = WaitingFile(
-            number=number, file=file, path=path, study=study, content=made.get(path) or _content(path)
-        )
+    for number, path in enumerate(track([*found]) if found else (), start=first):
+        study = found[path]
+        waiting = WaitingFile(number=number, path=path, study=study, content=made.get(path) or _content(path))
         try:
             log = read_design_log(path, waiting.content)
             of_design = Log(code=log.code, experiment=log.design.design)
@@ -215,7 +220,7 @@ def _designed(
             if told := told_by_design(number * LOGS_A_FILE, log.design, log.rows):
                 reading.told.setdefault(log.design.design, []).append(told)
         except BadLogError as bad:
-            reading.problems.append(bad.of(file, code_in_name(path) or "", experiment_in_name(path), study))
+            reading.problems.append(bad.of(Path(path), code_in_name(path) or "", experiment_in_name(path), study))
     return logs
 
 
@@ -225,13 +230,13 @@ def _by_design(reading: LogsSoFar, logs: Mapping[int, DesignLog], studies: Mappi
     found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], several=several)
     for number, log in logs.items():
         if log.key in others:
-            file = reading.files.pop(number // LOGS_A_FILE)
+            path = reading.paths.pop(number // LOGS_A_FILE)
             message = (
                 f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
                 "trial or questions differ); analyse it apart"
             )
             study = reading.studies[number]
-            reading.problems.append(BadLogError(message).of(file, log.code, log.design.design, study))
+            reading.problems.append(BadLogError(message).of(Path(path), log.code, log.design.design, study))
     return tuple(found)
 
 
@@ -239,10 +244,9 @@ def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) 
     """The files' contents, read in turn, but for tables that were `made` of journals."""
     waiting: list[WaitingFile] = []
     size = 0
-    files = zip(found.items(), track([Path(path) for path in found]), strict=True)
-    for number, ((path, study), file) in enumerate(files):
+    for number, path in enumerate(track([*found])):
         content = made[path] if path in made else _content(path)
-        waiting.append(WaitingFile(number=number, file=file, path=path, study=study, content=content))
+        waiting.append(WaitingFile(number=number, path=path, study=found[path], content=content))
         size += len(content) if isinstance(content, bytes) else 0
         if size >= _BATCH_BYTES:
             yield waiting
@@ -316,6 +320,6 @@ def _mapped(batch: Batch, first: int, logs: Sequence[MappedLog], mapping: Column
 
 def refuse_nothing(paths: Sequence[Path], logs: Logs) -> None:
     """`PlaceError` where there is no usable log at all, with every reason and what to do."""
-    if not logs.files:
+    if not logs.paths:
         reasons = [*map(str, logs.problems), *map(str, logs.begun)]
         raise PlaceError("\n".join(["no usable log in " + ", ".join(map(str, paths)), *reasons]))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from analysis.logs.doubles import ODDS, STRETCH, Double
-from analysis.logs.files import Problem
+from analysis.logs.files import Problem, seen_from
 from analysis.stats.binomial import binomial_test_p
 
 PersonCalled = Callable[[int, int], str]
@@ -59,15 +59,15 @@ def _same(double: Double) -> str:
     return f"{same} {rule}; find out whose they are, and take the copy out"
 
 
-def other_log(code: str, file: Path, beside: Path) -> str:
-    """A participant with their file, seen from another one's: no path says on which machine."""
-    return code if file == beside else f"{code} in {os.path.relpath(file, beside.parent)}"
+def other_log(code: str, path: str, beside: str) -> str:
+    """A participant with their file, as it is seen from another one's."""
+    return code if path == beside else f"{code} in {seen_from(path, beside)}"
 
 
 _CHANCE = 1e-3
 
 
-def turned_round(trials: pd.DataFrame, files: Iterable[Path]) -> Iterator[Problem]:
+def turned_round(trials: pd.DataFrame, paths: Sequence[str]) -> Iterator[Problem]:
     """What there is to say where nobody is right more often than by chance, and all together less often."""
     known = trials[trials["correct"].notna()]
     right = known.groupby("participant_id", observed=True)["correct"].agg(["sum", "size"]).astype(np.int64)
@@ -76,7 +76,7 @@ def turned_round(trials: pd.DataFrame, files: Iterable[Path]) -> Iterator[Proble
         return
     people = f"each of {len(right)} people is" if len(right) > 1 else "the one participant is"
     yield Problem(
-        file=Path(os.path.commonpath([*map(str, files)])),
+        file=Path(os.path.commonpath(paths)),
         line=None,
         column=None,
         message=f"{people} right in fewer than half of the trials, in {total} of {count} altogether "

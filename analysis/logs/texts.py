@@ -306,7 +306,7 @@ def joined(experiment: str, blocks: Iterable[Block], studies: Mapping[int, str])
     known = np.array([number in studies for number in log.tolist()], dtype=np.bool_)
     order = np.argsort(log)
     order = order[known[order]]
-    chosen_rows = None if np.array_equal(order, np.arange(len(log))) else _rows_of(order, rows)
+    chosen_rows = None if np.array_equal(order, np.arange(len(log))) else rows_of_logs(order, rows)
     made: dict[str, Any] = {}
     for column in tables.TABLES[experiment]:
         made[column.name] = _made(column, [block.columns[column.name] for block in mine], chosen_rows)
@@ -316,7 +316,7 @@ def joined(experiment: str, blocks: Iterable[Block], studies: Mapping[int, str])
     return pd.DataFrame(made, copy=False)
 
 
-def _rows_of(logs: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def rows_of_logs(logs: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """The places of the rows of some logs, in the order of these."""
     starts, counts = (np.cumsum(rows) - rows)[logs], rows[logs]
     return np.asarray(np.arange(counts.sum()) + np.repeat(starts - (np.cumsum(counts) - counts), counts))

@@ -147,8 +147,8 @@ def end(*, exceptions: bool) -> typer.Exit:
     return typer.Exit(EXCEPTIONS if exceptions else DONE)
 
 
-def tracked(files: Sequence[Path]) -> Iterable[Path]:
-    """The files one by one, with a progress bar on stderr."""
+def tracked(files: Sequence[str]) -> Iterable[str]:
+    """The files' paths one by one, with a progress bar on stderr."""
     from rich.console import Console
     from rich.progress import track
 
