@@ -23,7 +23,8 @@ from analysis.stats.diagnostics import effect_size, unit_scaled
 from analysis.stats.discrimination import Task, discrimination
 from analysis.stats.factorial import factorial_anova
 from analysis.stats.paired import friedman
-from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, Origin, QuestionSummary
+from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
+from analysis.summary.results import DesignSummary, Origin
 from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR, Level, QuestionConfig, shown_level
 from experiments.design.methods_section import methods_section

@@ -25,7 +25,8 @@ from analysis.report.figures.style import (
     wrapped,
 )
 from analysis.report.labels import text_columns
-from analysis.summary.results import ConditionSummary, DesignSummary, QuestionSummary
+from analysis.summary.question_results import ConditionSummary, QuestionSummary
+from analysis.summary.results import DesignSummary
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words
 

@@ -9,7 +9,8 @@ from dataclasses import replace
 from analysis.report import apa
 from analysis.report.labels import display_name, named
 from analysis.report.section import Picture, Section, Table
-from analysis.summary.results import ConditionSummary, DesignSummary, DesignTest, QuestionSummary
+from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
+from analysis.summary.results import DesignSummary
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import figure_of
 from experiments.design.language import Level

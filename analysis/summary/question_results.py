@@ -1,0 +1,60 @@
+"""What one question of a design gave, by condition, and what differs, as typed results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from analysis.report.serial import OPTIONAL
+from experiments.design.language import Level
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionSummary:
+    """One condition. `mean` and `sd` over people (n - 1); of scored answers the count right against chance, exact.
+
+    `mean` of numbers is geometric, `sd` then that of their natural logarithms.
+    """
+
+    levels: Mapping[str, Level]
+    people: int
+    trials: int
+    mean: float | None
+    sd: float | None
+    right: int | None = None
+    p: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    answers: Mapping[str, int] | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignTest:
+    """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made."""
+
+    name: str
+    effect: str
+    statistic: float | None = None
+    df: tuple[int, ...] | None = None
+    p: float | None = None
+    size: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuestionSummary:
+    """All that one question gave. `left_out`: who has no score in some condition, and so is in no test.
+
+    `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
+    level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean.
+    """
+
+    kind: str
+    cells: tuple[ConditionSummary, ...]
+    tests: tuple[DesignTest, ...]
+    left_out: tuple[str, ...] = ()
+    chance: float | None = None
+    preferred: tuple[ConditionSummary, ...] | None = field(default=None, metadata=OPTIONAL)
+    scale: str | None = field(default=None, metadata=OPTIONAL)
