@@ -92,6 +92,8 @@ class _Schema:
         hints = typing.get_type_hints(kind, include_extras=True)
         for field in fields(kind):
             schema, inner = self.of(hints[field.name]), field.metadata.get("beside")
+            if field.metadata.get("unwritten"):
+                continue
             if field.metadata.get("spread"):
                 yield "*", schema["additionalProperties"], False
             elif inner is not None:

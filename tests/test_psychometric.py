@@ -139,3 +139,13 @@ def test_a_group_draws_its_people_towards_each_other_by_how_little_they_say() ->
 def test_a_difference_does_not_pair_draws() -> None:
     ordered = np.sort(np.random.default_rng(1).normal(size=4000))
     assert np.std(difference(ordered, ordered)) == pytest.approx(np.sqrt(2), abs=0.05)
+
+
+def test_catch_trials_tell_the_guess_rate() -> None:
+    without = psychometric_fit(LEVELS, RIGHT, TRIALS, guess=None)
+    told = psychometric_fit(LEVELS, RIGHT, TRIALS, guess=None, catch=(300, 1000))
+    assert told.guess.median == pytest.approx(0.3, abs=0.03)
+    assert told.guess.high - told.guess.low < (without.guess.high - without.guess.low) / 2
+    assert told.reason is None
+    with pytest.raises(ValueError, match="catch must be yes answers of so many trials, not 5 of 4"):
+        psychometric_fit(LEVELS, RIGHT, TRIALS, guess=None, catch=(5, 4))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.special import xlogy
 
 from analysis.psychometric.grid import NAMES, LevelCounts, Posterior, posterior
 from analysis.psychometric.priors import Priors, default_priors
+from analysis.report.serial import UNWRITTEN
 from analysis.stats.arrays import FloatArray, numbers
 from analysis.stats.frames import Result
 from experiments.design.procedures.psychometric import Shape, share_felt
@@ -53,10 +54,12 @@ class PsychometricFit(Result):
     `width`: from F = 0.05 to 0.95, of a fit on a logarithmic axis as a ratio. `jnd`: half the distance, or the root of
     the ratio, between the levels at F = 1/4 and 3/4. `slope`: of the share, by unit of the axis, at the threshold.
     `where`: whether the threshold lies among the levels, as likely as not; what is not `within` is no measurement.
+    A `falling` function has fewer right answers the higher the level.
     """
 
     shape: Shape
     log: bool
+    falling: bool
     confidence: float
     threshold: Credible
     width: Credible
@@ -68,15 +71,32 @@ class PsychometricFit(Result):
     goodness: Goodness
     where: ThresholdPlace
     reason: str | None = None
-    draws: FloatArray = field(repr=False, compare=False, metadata={"written": False})
+    draws: FloatArray = field(repr=False, compare=False, metadata=UNWRITTEN)
     """(_DRAWS, 5): threshold, width, lapse, guess and overdispersion on the axis of the fit."""
+
+    @property
+    def threshold_draws(self) -> FloatArray:
+        """Draws (_DRAWS,) of the threshold, as a level."""
+        return self._axis.back(self.draws[:, 0])
+
+    @property
+    def jnd_draws(self) -> FloatArray:
+        """Draws (_DRAWS,) of the JND."""
+        return self._axis.distance(_quarter(self.draws, self.shape))
+
+    @property
+    def _axis(self) -> _LevelAxis:
+        return _LevelAxis(log=self.log, falling=self.falling)
 
     def curve(self, levels: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The share at levels (m,): its posterior median, and the band that holds its middle `confidence`."""
-        shares = _shares(self.draws, _axis(numbers(levels, "levels"), log=self.log), self.shape)
         tail = (1 - self.confidence) / 2
-        low, middle, high = np.quantile(shares, [tail, 0.5, 1 - tail], axis=0)
+        low, middle, high = np.quantile(self.shares(levels), [tail, 0.5, 1 - tail], axis=0)
         return middle, low, high
+
+    def shares(self, levels: ArrayLike) -> FloatArray:
+        """The share at levels (m,) by each draw: (_DRAWS, m)."""
+        return _shares(self.draws, self._axis.of(numbers(levels, "levels")), self.shape)
 
     def level_at(self, share: float) -> Credible:
         """The level at which F is `share`, above 0 and below 1: 0.5 is the threshold.
@@ -85,7 +105,7 @@ class PsychometricFit(Result):
         """
         if not 0 < share < 1:
             raise ValueError(f"share must be above 0 and below 1, not {share:g}")
-        return _estimate(_at(self.draws, share, self.shape), self.confidence, _back(log=self.log))
+        return _estimate(_at(self.draws, share, self.shape), self.confidence, self._axis.back)
 
 
 def psychometric_fit(
@@ -95,16 +115,19 @@ def psychometric_fit(
     *,
     guess: float | None,
     lapse: float | None = None,
+    catch: tuple[int, int] = (0, 0),
     overdispersed: bool = False,
     shape: Shape = "normal",
     log: bool = False,
+    falling: bool = False,
     priors: Priors | None = None,
     confidence: float = 0.95,
 ) -> PsychometricFit:
     """Fit share(x) = g + (1 - g - l) F((x - threshold) / width) to `right` (k,) of `trials` (k,) at `levels` (k,).
 
     `guess` is chance where the design knows it (1/2, 1/3), and `None` where it is fitted, as for yes or no; `lapse`
-    likewise. `overdispersed` fits how much more than binomially answers vary. With `log`, F is of ln x.
+    likewise. `catch`: yes answers and trials without a stimulus, whose share is g. `overdispersed` fits how much more
+    than binomially answers vary. With `log`, F is of ln x; `falling`: F falls with x.
     `ValueError`: fewer than two different levels, counts that are none, levels that have no logarithm.
     Sources: Wichmann and Hill 2001, Percept. Psychophys. 63, 1293; Schütt and others 2016, Vision Res. 122, 105.
 
@@ -112,7 +135,8 @@ def psychometric_fit(
     >>> found.where, round(found.threshold.median, 1)
     ('within', 9.5)
     """
-    counts = _counts(levels, right, trials, shape, log=log)
+    axis = _LevelAxis(log=log, falling=falling)
+    counts = _counts(levels, right, trials, shape, axis)
     if not 0 < confidence < 1:
         raise ValueError(f"confidence must be above 0 and below 1, not {confidence:g}")
     fixed = {} if overdispersed else {"overdispersion": 0.0}
@@ -121,11 +145,32 @@ def psychometric_fit(
             if not 0 <= rate < 1:
                 raise ValueError(f"{name} must be at least 0 and below 1, not {rate:g}")
             fixed[name] = float(rate)
-    draws = _draws(posterior(counts, priors or default_priors(counts.levels), fixed))
-    return _fit(counts, draws, log=log, confidence=confidence)
+    used = _with_catch(counts, catch)
+    draws = _draws(posterior(used, priors or default_priors(counts.levels), fixed))
+    where, reason = _where(axis.back(counts.levels), axis.back(draws[:, 0]))
+    return _fit(used, draws, axis, where=where, reason=reason, confidence=confidence)
 
 
-def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape, *, log: bool) -> LevelCounts:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LevelAxis:
+    """The axis on which F rises: levels, or their logarithms, with the sign turned where F falls with the level."""
+
+    log: bool
+    falling: bool
+
+    def of(self, levels: FloatArray) -> FloatArray:
+        shown = np.log(levels) if self.log else levels
+        return -shown if self.falling else shown
+
+    def back(self, places: FloatArray) -> FloatArray:
+        shown = -places if self.falling else places
+        return np.exp(shown) if self.log else shown
+
+    def distance(self, apart: FloatArray) -> FloatArray:
+        return np.exp(apart) if self.log else apart
+
+
+def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape, axis: _LevelAxis) -> LevelCounts:
     given = {"levels": numbers(levels, "levels"), "right": numbers(right, "right"), "trials": numbers(trials, "trials")}
     sizes = {name: array.shape for name, array in given.items()}
     if given["levels"].ndim != 1 or len(set(sizes.values())) > 1:
@@ -140,25 +185,29 @@ def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape
         raise ValueError(
             f"right must be whole numbers from 0 to trials (at most 1,000,000), not {counted} at index {place}"
         )
-    if log and (given["levels"] <= 0).any():
+    if axis.log and (given["levels"] <= 0).any():
         raise ValueError(f"levels must be above 0 for a logarithmic axis, not {given['levels'].min():g}")
     kept = given["trials"] > 0
     if np.unique(given["levels"][kept]).size < 2:
         raise ValueError("levels must hold at least two different ones with trials")
     return LevelCounts(
-        levels=_axis(given["levels"][kept], log=log),
-        right=given["right"][kept],
-        trials=given["trials"][kept],
-        shape=shape,
+        levels=axis.of(given["levels"][kept]), right=given["right"][kept], trials=given["trials"][kept], shape=shape
     )
 
 
-def _axis(levels: FloatArray, *, log: bool) -> FloatArray:
-    return np.log(levels) if log else levels
-
-
-def _back(*, log: bool) -> Callable[[FloatArray], FloatArray]:
-    return np.exp if log else np.asarray
+def _with_catch(counts: LevelCounts, catch: tuple[int, int]) -> LevelCounts:
+    """The counts, and those of trials without a stimulus: a level so low that F is 0."""
+    yes, trials = catch
+    if not 0 <= yes <= trials <= _MOST_TRIALS:
+        raise ValueError(f"catch must be yes answers of so many trials, not {yes:g} of {trials:g}")
+    if not trials:
+        return counts
+    return replace(
+        counts,
+        levels=np.append(counts.levels, -np.inf),
+        right=np.append(counts.right, float(yes)),
+        trials=np.append(counts.trials, float(trials)),
+    )
 
 
 def _draws(found: Posterior) -> FloatArray:
@@ -173,25 +222,27 @@ def _draws(found: Posterior) -> FloatArray:
     return np.stack(columns, axis=-1)
 
 
-def _fit(counts: LevelCounts, draws: FloatArray, *, log: bool, confidence: float) -> PsychometricFit:
+def _fit(
+    counts: LevelCounts,
+    draws: FloatArray,
+    axis: _LevelAxis,
+    *,
+    where: ThresholdPlace,
+    reason: str | None,
+    confidence: float,
+) -> PsychometricFit:
     by_name = dict(zip(NAMES, draws.T, strict=True))
-    back, width = _back(log=log), by_name["width"]
-    quarter = np.abs(_at(draws, 0.75, counts.shape) - _at(draws, 0.25, counts.shape)) / 2
-    slack = 1 - by_name["guess"] - by_name["lapse"]
-    step = 1e-4 * width
-    rise = share_felt(by_name["threshold"] + step, by_name["threshold"], width, counts.shape) - share_felt(
-        by_name["threshold"] - step, by_name["threshold"], width, counts.shape
-    )
-    where, reason = _where(counts, by_name["threshold"], back)
     rates = {name: _estimate(by_name[name], confidence) for name in ("lapse", "guess", "overdispersion")}
+    rise = _rise(draws, counts.shape)
     return PsychometricFit(
         shape=counts.shape,
-        log=log,
+        log=axis.log,
+        falling=axis.falling,
         confidence=confidence,
-        threshold=_estimate(by_name["threshold"], confidence, back),
-        width=_estimate(width, confidence, back),
-        jnd=_estimate(quarter, confidence, back),
-        slope=_estimate(slack * rise / (2 * step), confidence),
+        threshold=_estimate(by_name["threshold"], confidence, axis.back),
+        width=_estimate(by_name["width"], confidence, axis.distance),
+        jnd=_estimate(_quarter(draws, counts.shape), confidence, axis.distance),
+        slope=_estimate(-rise if axis.falling else rise, confidence),
         **rates,
         goodness=_goodness(counts, draws),
         where=where,
@@ -200,31 +251,39 @@ def _fit(counts: LevelCounts, draws: FloatArray, *, log: bool, confidence: float
     )
 
 
+def _rise(draws: FloatArray, shape: Shape) -> FloatArray:
+    """The slope of the share at the threshold, by unit of the fit's axis."""
+    at, width = draws[:, 0], draws[:, 1]
+    step = 1e-4 * width
+    rise = share_felt(at + step, at, width, shape) - share_felt(at - step, at, width, shape)
+    return np.asarray((1 - draws[:, 2] - draws[:, 3]) * rise / (2 * step))
+
+
+def _quarter(draws: FloatArray, shape: Shape) -> FloatArray:
+    """Half the distance between F = 1/4 and 3/4."""
+    return np.asarray(np.abs(_at(draws, 0.75, shape) - _at(draws, 0.25, shape)) / 2)
+
+
 def _estimate(values: FloatArray, confidence: float, back: Callable[[FloatArray], FloatArray] = np.asarray) -> Credible:
     tail = (1 - confidence) / 2
-    low, middle, high = back(np.quantile(values, [tail, 0.5, 1 - tail]))
+    low, middle, high = sorted(back(np.quantile(values, [tail, 0.5, 1 - tail])))
     return Credible(
         median=float(middle), mean=float(back(values.mean(keepdims=True))[0]), low=float(low), high=float(high)
     )
 
 
-def _where(
-    counts: LevelCounts, thresholds: FloatArray, back: Callable[[FloatArray], FloatArray]
-) -> tuple[ThresholdPlace, str | None]:
+def _where(levels: FloatArray, thresholds: FloatArray) -> tuple[ThresholdPlace, str | None]:
     """Whether there is a threshold among the levels, and if not, what can be said."""
-    low, high = float(counts.levels.min()), float(counts.levels.max())
+    low, high = float(levels.min()), float(levels.max())
     below, above = float((thresholds < low).mean()), float((thresholds > high).mean())
-    first, last = back(np.array([low, high]))
-    if below <= 0.5 and above <= 0.5 and below + above <= 0.5:
-        return "within", None
+    none = "no threshold within the levels:"
     if below > 0.5:
-        return "below", f"no threshold within the levels: it lies below {first:g} (probability {below:.2f})"
+        return "below", f"{none} it lies below {low:g} (probability {below:.2f})"
     if above > 0.5:
-        return "above", f"no threshold within the levels: it lies above {last:g} (probability {above:.2f})"
-    return (
-        "unknown",
-        f"no threshold within the levels: the answers do not say on which side of {first:g} to {last:g} it lies",
-    )
+        return "above", f"{none} it lies above {high:g} (probability {above:.2f})"
+    if below + above > 0.5:
+        return "unknown", f"{none} the answers do not say on which side of {low:g} to {high:g} it lies"
+    return "within", None
 
 
 def _at(draws: FloatArray, share: float, shape: Shape) -> FloatArray:

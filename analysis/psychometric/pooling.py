@@ -9,11 +9,12 @@ deviation with a half-Cauchy prior whose scale is the spread of the people's own
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from analysis.psychometric.fit import Credible
+from analysis.report.serial import UNWRITTEN
 from analysis.stats.arrays import FloatArray
 from analysis.stats.frames import Result
 
@@ -27,6 +28,8 @@ class Group(Result):
     mean: Credible
     sd: Credible
     people: tuple[Credible, ...]
+    mean_draws: FloatArray = field(repr=False, compare=False, metadata=UNWRITTEN)
+    """Draws of the mean, as many as of each person."""
 
 
 def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group:
@@ -57,6 +60,7 @@ def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group
         mean=_estimate(means, weights.sum(axis=1), confidence),
         sd=_estimate(sds, weights.sum(axis=0), confidence),
         people=tuple(_estimate(values, one, confidence) for one in of_people),
+        mean_draws=_quantiles(means, weights.sum(axis=1), (np.arange(draws[0].size) + 0.5) / draws[0].size),
     )
 
 
@@ -75,8 +79,12 @@ def _histograms(draws: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
 
 
 def _estimate(values: FloatArray, weights: FloatArray, confidence: float) -> Credible:
-    weights = weights / weights.sum()
-    passed = np.cumsum(weights) - weights / 2
     tail = (1 - confidence) / 2
-    low, median, high = np.interp([tail, 0.5, 1 - tail], passed, values)
-    return Credible(median=float(median), mean=float(weights @ values), low=float(low), high=float(high))
+    low, median, high = _quantiles(values, weights, np.array([tail, 0.5, 1 - tail]))
+    mean = float(weights @ values / weights.sum())
+    return Credible(median=float(median), mean=mean, low=float(low), high=float(high))
+
+
+def _quantiles(values: FloatArray, weights: FloatArray, shares: FloatArray) -> FloatArray:
+    passed = np.cumsum(weights) - weights / 2
+    return np.asarray(np.interp(shares * weights.sum(), passed, values))

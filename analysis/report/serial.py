@@ -20,6 +20,9 @@ OPTIONAL: Final = {"optional": True}
 SPREAD: Final = {"spread": True}
 """Metadata of a mapping whose values stand under their own names beside its neighbours."""
 
+UNWRITTEN: Final = {"unwritten": True}
+"""Metadata of a field that stands in no file and no table: what others are worked out from."""
+
 
 def beside(result: type) -> dict[str, type]:
     """Metadata of a field whose own fields, those of `result`, stand beside its neighbours; all null for None."""
@@ -119,6 +122,8 @@ def _members(result: Any) -> Iterator[tuple[str, Any]]:
     """The names and values of a result as they are written."""
     for field in fields(result):
         value, inner = getattr(result, field.name), field.metadata.get("beside")
+        if field.metadata.get("unwritten"):
+            continue
         if field.metadata.get("spread"):
             yield from value.items()
         elif inner is not None:

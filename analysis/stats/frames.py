@@ -146,7 +146,7 @@ def _members(result: Any, prefix: str) -> Iterator[tuple[str, object]]:
         value = getattr(result, field.name)
         if is_dataclass(value):
             yield from _members(value, f"{prefix}{field.name}_")
-        else:
+        elif not field.metadata.get("unwritten"):
             yield f"{prefix}{field.name}", value
 
 

@@ -25,6 +25,7 @@ from analysis.stats.factorial import factorial_anova
 from analysis.stats.paired import friedman
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary, Origin
+from analysis.summary.thresholds import MOST_COMPARED, thresholds
 from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR, Level, QuestionConfig, shown_level
 from experiments.design.methods_section import methods_section
@@ -33,18 +34,28 @@ from experiments.tasks.questions import chance, correct_columns
 
 
 def summarise(
-    design: DesignConfig, table: pd.DataFrame, gun_labels: Mapping[str, str] = MappingProxyType({})
+    design: DesignConfig,
+    table: pd.DataFrame,
+    gun_labels: Mapping[str, str] = MappingProxyType({}),
+    *,
+    fits: bool = False,
 ) -> DesignSummary:
     """The statistics of a design from its table: one row a trial, the columns of `design_table.columns`.
 
-    Pairs are described, not tested. `gun_labels`: what the gun calls its methods.
+    Pairs are described, not tested. `gun_labels`: what the gun calls its methods; `fits`: psychometric functions are
+    fitted to everybody, however many there are.
     """
     asked = {name: question for name, question in design.questions.items() if question.kind != "text"}
     return DesignSummary(
         title=design.title,
         n=int(table["participant_id"].nunique()),
         factors={name: factor.all_levels for name, factor in design.factors.items()},
-        questions={name: _question(design, name, question, table) for name, question in asked.items()},
+        questions={
+            name: replace(
+                _question(design, name, question, table), thresholds=thresholds(design, name, table, everybody=fits)
+            )
+            for name, question in asked.items()
+        },
         origin=_hands(design, table),
         words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
         assumed=design.assumed,
@@ -322,10 +333,6 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
     if question.kind in {"rating", "ranking"}:
         ranks = friedman(scores)
         yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)
-
-
-MOST_COMPARED = 10
-"""Of more conditions the pairs fill pages that nobody reads."""
 
 
 def _pairs(scores: FloatArray, labels: Sequence[str], question: QuestionConfig) -> Iterator[DesignTest]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from analysis.report.serial import OPTIONAL
+from analysis.summary.thresholds import Thresholds
 from experiments.design.language import Level
 
 
@@ -48,7 +49,8 @@ class QuestionSummary:
     """All that one question gave. `left_out`: who has no score in some condition, and so is in no test.
 
     `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
-    level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean.
+    level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean. `thresholds`: the
+    psychometric functions over a numeric factor, where an answer can be a success.
     """
 
     kind: str
@@ -58,3 +60,4 @@ class QuestionSummary:
     chance: float | None = None
     preferred: tuple[ConditionSummary, ...] | None = field(default=None, metadata=OPTIONAL)
     scale: str | None = field(default=None, metadata=OPTIONAL)
+    thresholds: Thresholds | None = field(default=None, metadata=OPTIONAL)

@@ -71,14 +71,15 @@ UNDEFINED = "written as null"
 def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell = untold) -> results.StudyStatistics:
     """The statistics of `logs`: rates 0 to 1, SD with n - 1; `tell` of "statistics" and of "fits".
 
-    `trade`: with the measures of speed and accuracy; `fits`: with diffusion fits among them. An experiment without a
-    log is left out. Participants who miss an answer or a method are left out of that experiment and listed in
-    `excluded`. Numbers that are NaN or infinite are named in `warnings`. What stands apart in the logs is kept apart.
+    `trade`: with the measures of speed and accuracy; `fits`: with diffusion fits among them, and psychometric
+    functions of everybody. An experiment without a log is left out. Participants who miss an answer or a method are
+    left out of that experiment and listed in `excluded`. Numbers that are NaN or infinite are named in
+    `warnings`. What stands apart in the logs is kept apart.
     """
     names = logs.methods
     direction, left_out = _direction(logs.trials, names) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings, names) if len(logs.ratings) else (None, [])
-    designs = {one.design.design: summarise(one.design, one.table, one.gun_labels) for one in logs.designs}
+    designs = {one.design.design: summarise(one.design, one.table, one.gun_labels, fits=fits) for one in logs.designs}
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
     found = results.StudyStatistics(
         direction=direction,

@@ -62,7 +62,7 @@ def analyze(
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
     codebook: Annotated[Path | None, typer.Option(metavar="CODES.toml", help="Codes of free descriptions.")] = None,
     requests: RequestsOption = None,
-    fits: Annotated[bool, typer.Option("--fits", help="With the diffusion model fitted to response times.")] = False,
+    fits: Annotated[bool, typer.Option("--fits", help="Fit the diffusion model, and everybody's thresholds.")] = False,
     include_synthetic: IncludeSyntheticOption = False,
     as_json: AsJsonOption = False,
 ) -> None:

@@ -13,6 +13,7 @@ from analysis.summary.question_results import ConditionSummary, DesignTest, Ques
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import figure_of
+from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
@@ -32,9 +33,10 @@ _TOLD = 6
 
 
 def sections_of_designs(report: ReportData) -> Iterator[Section]:
-    """Each design's section."""
+    """Each design's section, and those of its psychometric functions."""
     for name, found in report.statistics.designs.items():
         yield _design_section(name, found)
+        yield from threshold_sections(name, found)
 
 
 def _design_section(name: str, found: DesignSummary) -> Section:
@@ -65,7 +67,13 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
     people = f"{found.n:,} {'synthetic ' if found.origin.synthetic else ''}participant{'' if found.n == 1 else 's'}"
     for asked, question in found.questions.items():
         if question.cells:
-            told = " ".join([_cells_words(found, question), *_tests_words(question, exact=exact)])
+            told = " ".join(
+                [
+                    _cells_words(found, question),
+                    *_tests_words(question, exact=exact),
+                    *threshold_sentences(found, question),
+                ]
+            )
             yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 

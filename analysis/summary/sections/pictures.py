@@ -10,6 +10,7 @@ from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
 from analysis.summary.figures.designs import figure_design
+from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.results import figure_8, figure_directions, has_matrix
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
@@ -47,13 +48,25 @@ def write_figures(folder: Path, report: ReportData) -> None:
             figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
     for name, one in drawn_designs(statistics).items():
         figure_design(one, folder / figure_of(name))
+        _write_functions(folder, name, one)
     if report.panels:
         figure_5(report.panels, folder / _SHOT_FIGURE)
+
+
+def _write_functions(folder: Path, name: str, design: DesignSummary) -> None:
+    for asked, question in design.questions.items():
+        if question.thresholds is not None and question.thresholds.conditions:
+            figure_functions(design, question.thresholds, folder / functions_figure_of(name, asked))
 
 
 def figure_of(name: str) -> str:
     """The stem of a design's figure."""
     return f"figure-{name}"
+
+
+def functions_figure_of(name: str, question: str) -> str:
+    """The stem of the figure of a question's psychometric functions."""
+    return f"figure-{name}-{question}-functions"
 
 
 def drawn_designs(statistics: StudyStatistics) -> dict[str, DesignSummary]:

@@ -1,0 +1,171 @@
+"""Psychometric functions: the points that were answered, sized by their trials, and the curves fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from analysis.psychometric.fit import Credible
+from analysis.psychometric.people import ShareAtLevel, mean_curve
+from analysis.report.figures.style import (
+    drawn,
+    drawn_name,
+    legend_below,
+    light_grid,
+    method_colour,
+    method_line,
+    method_marker,
+    reference_line,
+)
+from analysis.stats.arrays import FloatArray
+from analysis.stats.binomial import binomial_test
+from analysis.summary.results import DesignSummary
+from analysis.summary.thresholds import ConditionFit, Thresholds
+from experiments.design.methods_section import factor_words
+
+MOST_PANELS = 19
+"""So many participants have a panel: with that of all people a page is full."""
+_ACROSS, _WIDE_IN, _HIGH_IN = 4, 2.3, 2.1
+_CURVE = 101
+_MOST_POINTS, _JOINED = 12, 8
+"""Of more levels than this, neighbours are joined into so many points: those of an adaptive run have a trial each."""
+_AREA = 90.0
+"""Of the point with most trials, in square points."""
+_MOST_CURVES = 8
+
+_LABELS = {"right": "right [%]", "yes": "yes [%]", "chosen": "chosen over the standard [%]"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Curve:
+    """What one panel shows of one condition: points, a curve with its band, and a threshold with its interval."""
+
+    points: tuple[ShareAtLevel, ...]
+    shares: tuple[FloatArray, FloatArray, FloatArray] | None
+    threshold: Credible | None
+
+
+def figure_functions(found: DesignSummary, of: Thresholds, path_stem: Path) -> None:
+    """A panel for all people, if there are several, and one for each of the first; PNG, SVG and PDF are written."""
+    levels = np.linspace(*_span(of), _CURVE)
+    conditions = of.conditions[:_MOST_CURVES]
+    people = list(dict.fromkeys(one.participant for condition in conditions for one in condition.people))
+    panels = [(who, [_own(condition, who, levels) for condition in conditions]) for who in people[:MOST_PANELS]]
+    if len(people) > 1:
+        panels.insert(0, (f"all {of.people:,} people", [_of_all(condition, levels) for condition in conditions]))
+    across = min(_ACROSS, len(panels))
+    rows = -(-len(panels) // across)
+    with drawn(path_stem, max(0.6 + _WIDE_IN * across, 4.2), 0.7 + _HIGH_IN * rows) as figure:
+        grid = list(figure.subplots(rows, across, squeeze=False, sharex=True, sharey=True).ravel())
+        for axes, (title, curves) in zip(grid, panels, strict=False):
+            axes.set_title(drawn_name(title), loc="left", fontsize=9.0, parse_math=False)
+            _draw(axes, curves, levels)
+        for place, axes in enumerate(grid):
+            axes.set_visible(place < len(panels))
+            axes.tick_params(labelbottom=place + across >= len(panels))
+        _label(figure, grid, found, of)
+
+
+def _span(of: Thresholds) -> tuple[float, float]:
+    levels = [point.level for condition in of.conditions for point in condition.points]
+    return min(levels), max(levels)
+
+
+def _own(condition: ConditionFit, who: str, levels: FloatArray) -> _Curve:
+    one = next((one for one in condition.people if one.participant == who), None)
+    if one is None or one.fit is None:
+        return _Curve(points=() if one is None else one.points, shares=None, threshold=None)
+    within = one.fit.threshold if one.fit.where == "within" else None
+    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within)
+
+
+def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
+    fits = [one.fit for one in condition.people if one.fit is not None]
+    return _Curve(
+        points=condition.points,
+        shares=mean_curve(fits, levels) if fits else None,
+        threshold=None if condition.group is None else condition.group.threshold,
+    )
+
+
+def _draw(axes: Axes, curves: Sequence[_Curve], levels: FloatArray) -> None:
+    light_grid(axes)
+    for i, curve in enumerate(curves):
+        colour = method_colour(i)
+        if curve.shares is not None:
+            middle, low, high = (100 * share for share in curve.shares)
+            axes.fill_between(levels, low, high, color=colour, alpha=0.15, linewidth=0)
+            axes.plot(levels, middle, color=colour, linestyle=method_line(i), linewidth=1.3)
+        _draw_points(axes, neighbours_joined(curve.points), i)
+        if curve.threshold is not None:
+            foot = 2.5 + 4.0 * i
+            axes.plot([curve.threshold.low, curve.threshold.high], [foot, foot], color=colour, linewidth=2.0)
+            axes.plot([curve.threshold.median], [foot], "|", color=colour, markersize=9.0, mew=1.6)
+
+
+def _draw_points(axes: Axes, points: Sequence[ShareAtLevel], i: int) -> None:
+    if not points:
+        return
+    at, right, trials = (np.array([getattr(one, name) for one in points]) for name in ("level", "right", "trials"))
+    exact = binomial_test(right, trials)
+    axes.vlines(
+        at, 100 * np.asarray(exact.ci_low), 100 * np.asarray(exact.ci_high), color=method_colour(i), linewidth=0.8
+    )
+    axes.scatter(
+        at,
+        100 * right / trials,
+        s=np.maximum(_AREA * trials / trials.max(), 6.0) * 0.5,
+        marker=method_marker(i),
+        color=method_colour(i),
+        edgecolors="white",
+        linewidths=0.4,
+        zorder=3.0,
+    )
+
+
+def neighbours_joined(points: Sequence[ShareAtLevel]) -> list[ShareAtLevel]:
+    """The points, neighbours joined where there are too many; each at the mean level of its trials.
+
+    >>> of = [ShareAtLevel(level=float(level), right=1, trials=1) for level in range(16)]
+    >>> [(one.level, one.trials) for one in neighbours_joined(of)][:2]
+    [(0.5, 2), (2.5, 2)]
+    """
+    if len(points) <= _MOST_POINTS:
+        return list(points)
+    trials = np.array([point.trials for point in points])
+    before = np.cumsum(trials) - trials / 2
+    bins = np.minimum((before * _JOINED / trials.sum()).astype(int), _JOINED - 1)
+    some = ([point for point, of in zip(points, bins, strict=True) if of == place] for place in range(_JOINED))
+    return [
+        ShareAtLevel(
+            level=sum(one.level * one.trials for one in of) / sum(one.trials for one in of),
+            right=sum(one.right for one in of),
+            trials=sum(one.trials for one in of),
+        )
+        for of in some
+        if of
+    ]
+
+
+def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thresholds) -> None:
+    if of.guess is not None:
+        for axes in grid:
+            reference_line(axes, 100 * of.guess, "")
+    if of.standard is not None and not isinstance(of.standard, str):
+        for axes in grid:
+            axes.axvline(of.standard, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    grid[0].set_ylim(-3.0, 103.0)
+    grid[0].xaxis.set_major_locator(MaxNLocator(4))
+    figure.supxlabel(factor_words(of.factor), fontsize=9.0)
+    figure.supylabel(_LABELS[of.share], fontsize=9.0)
+    if len(of.conditions) > 1:
+        for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
+            name = ", ".join(drawn_name(found.label(factor, level)) for factor, level in condition.levels.items())
+            grid[0].plot([], [], color=method_colour(i), linestyle=method_line(i), marker=method_marker(i), label=name)
+        legend_below(figure, grid[0], 3)

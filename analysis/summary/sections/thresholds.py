@@ -1,0 +1,247 @@
+"""Psychometric functions in a report: what was fitted, the group's thresholds, differences, and everybody's own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from analysis.psychometric.fit import Credible
+from analysis.psychometric.people import FEWEST_ANSWERS, PersonFit
+from analysis.report import apa
+from analysis.report.labels import display_name
+from analysis.report.section import LISTED, SHOWN, Picture, Section, Table
+from analysis.summary.figures.functions import MOST_PANELS
+from analysis.summary.question_results import QuestionSummary
+from analysis.summary.results import DesignSummary
+from analysis.summary.sections.pictures import functions_figure_of
+from analysis.summary.thresholds import ConditionFit, Thresholds
+from experiments.design.language import Level
+from experiments.design.methods_section import factor_words
+
+_SHARES = {"right": "right answers", "yes": "yes", "chosen": "choices of the level over the standard"}
+_TOLD = 4
+"""So many conditions are told in a sentence; more are in the table."""
+
+
+def threshold_sections(name: str, found: DesignSummary) -> Iterator[Section]:
+    """A section for each question that has psychometric functions."""
+    for asked, question in found.questions.items():
+        if question.thresholds is not None:
+            yield _section(name, asked, found, question.thresholds)
+
+
+def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iterator[str]:
+    """The group's threshold in each condition, in a sentence; why there is none."""
+    of = question.thresholds
+    if of is None:
+        return
+    if of.reason:
+        yield f"No psychometric function: {of.reason}."
+    told = [one for one in of.conditions if one.group is not None]
+    if told:
+        digits = _digits(of)
+        shown = "; ".join(f"{_condition(found, one.levels)}{_group_words(one, digits)}" for one in told[:_TOLD])
+        more = f"; and of {len(told) - _TOLD} more conditions" if len(told) > _TOLD else ""
+        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over people: {shown}{more}."
+
+
+def _group_words(one: ConditionFit, digits: int) -> str:
+    if one.group is None:
+        return ""
+    jnd = apa.number(one.group.jnd.median, digits)
+    return f"{apa.number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}"
+
+
+def _measure(of: Thresholds) -> str:
+    return "point of subjective equality" if of.share == "chosen" else "threshold"
+
+
+def _section(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Section:
+    title = f"{(found.title or name.capitalize()).rstrip('.?!')}: psychometric functions of {asked}"
+    if of.reason:
+        return Section(title=title, paragraphs=(f"None was fitted: {of.reason}.",))
+    return Section(
+        title=title,
+        paragraphs=(_what(of), *_who(of), *_without(of)),
+        pictures=(_picture(name, asked, found, of),),
+        tables=tuple(_tables(asked, found, of)),
+    )
+
+
+def _what(of: Thresholds) -> str:
+    way = "falls" if of.falling else "rises"
+    guess = (
+        f"guess rate {apa.number(of.guess)}, one in so many answers"
+        if of.guess is not None
+        else "guess rate fitted, with the answers to catch trials where there were some"
+    )
+    halfway = "the level that is chosen as often as the standard, but for guesses and lapses"
+    if of.share != "chosen":
+        right = "" if of.guess is None else f", {apa.percent((1 + of.guess) / 2, 0)} where nobody lapses"
+        halfway = f"the level halfway between guess and lapse rate{right}"
+    return (
+        f"The share of {_SHARES[of.share]} {way} with {factor_words(of.factor)} as a cumulative normal, fitted person "
+        f"by person on a grid of threshold, width and rates ({guess}; lapse rate fitted; priors of psignifit 4). "
+        f"{_measure(of).capitalize()}: {halfway}. JND: half the distance between the levels at a quarter and three "
+        "quarters of the way. Numbers are medians with 95 % credible intervals; the means over people and the pooled "
+        "values draw people towards each other, the more the less their own answers tell."
+    )
+
+
+def _who(of: Thresholds) -> Iterator[str]:
+    if of.fitted < of.people:
+        yield (
+            f"Fitted were {of.fitted:,} of {of.people:,} people, evenly spaced in the order of their codes; "
+            "`recoil analyze --fits` fits everybody. The points of the group are of all people."
+        )
+    if of.even:
+        yield f"{of.even:,} trials had the same level in both intervals, and tell nothing of a choice."
+
+
+def _without(of: Thresholds) -> Iterator[str]:
+    people = [one for condition in of.conditions for one in condition.people]
+    unfitted = sum(one.fit is None for one in people)
+    lacking = sum(one.reason is not None for one in people) - unfitted
+    if lacking:
+        yield (
+            f"{lacking} of {len(people)} fits found no threshold within the levels: their numbers rest on the prior, "
+            "are no measurement, and count in the group by how little they say. The table tells which."
+        )
+    if unfitted:
+        yield f"{unfitted} of {len(people)} had too few answers for a fit: below {FEWEST_ANSWERS}, or at one level."
+
+
+def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Picture:
+    people = list(dict.fromkeys(one.participant for condition in of.conditions for one in condition.people))
+    more = len(people) - MOST_PANELS
+    rest = f" {more:,} more people have no panel; their numbers are in the table." if more > 0 else ""
+    dashed = "the standard" if of.share == "chosen" else "chance" if of.guess is not None else ""
+    group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
+    caption = (
+        f"{found.title.rstrip('.?!')}, {asked}: {group}a panel a participant. Points: shares with exact 95 % "
+        "intervals, their area the number of trials; of many levels neighbours are joined. Lines and bands: fitted "
+        f"curves with 95 % credible bands; bars at the foot: {_measure(of)} with its interval, left out where it is "
+        f"not within the levels.{f' Dashed: {dashed}.' if dashed else ''}{rest}"
+    )
+    said = "; ".join(threshold_words(found, of)) or "nobody's fit"
+    return Picture(
+        stem=functions_figure_of(name, asked), caption=caption, alt=f"Psychometric functions. {_measure(of)}: {said}."
+    )
+
+
+def threshold_words(found: DesignSummary, of: Thresholds) -> Iterator[str]:
+    """Each condition's threshold in the group, or one person's."""
+    for one in of.conditions[:_TOLD]:
+        if one.group is not None:
+            yield f"{_condition(found, one.levels)}{_group_words(one, _digits(of))}"
+        elif one.people and (fit := one.people[0].fit) is not None:
+            shown = one.people[0].reason or apa.number(fit.threshold.median, _digits(of))
+            yield f"{_condition(found, one.levels)}{shown}"
+
+
+def _condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
+    named = ", ".join(display_name(found.label(name, level)) for name, level in levels.items())
+    return f"{named}: " if named else ""
+
+
+def _cells(found: DesignSummary, levels: Mapping[str, Level]) -> tuple[str, ...]:
+    return (_condition(found, levels).removesuffix(": "),) if levels else ()
+
+
+def _tables(asked: str, found: DesignSummary, of: Thresholds) -> Iterator[Table]:
+    digits, conditions = _digits(of), ("Condition",) if of.conditions[0].levels else ()
+    measure = _measure(of).capitalize()
+    groups = [(one, one.group) for one in of.conditions if one.group is not None]
+    if groups:
+        yield Table(
+            caption=f"{asked}: {_measure(of)} over people, in {factor_words(of.factor)}",
+            header=(
+                *conditions,
+                "People",
+                f"{measure}, mean",
+                "95 % interval",
+                "SD",
+                "JND",
+                "95 % interval",
+                "Without",
+            ),
+            rows=tuple(
+                (
+                    *_cells(found, one.levels),
+                    str(group.people),
+                    *_estimate(group.threshold, digits),
+                    apa.number(group.sd.median, digits),
+                    *_estimate(group.jnd, digits),
+                    str(group.without),
+                )
+                for one, group in groups
+            ),
+        )
+    if of.differences:
+        yield Table(
+            caption=f"{asked}: differences of the {_measure(of)}; without correction for their number",
+            header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
+            rows=tuple(
+                (
+                    " − ".join(_condition(found, side).removesuffix(": ") for side in (one.a, one.b)),
+                    str(one.threshold.people),
+                    "yes" if one.threshold.within else "no",
+                    *_estimate(one.threshold.difference, digits),
+                )
+                for one in of.differences
+            ),
+        )
+    yield _people(asked, found, of, digits)
+
+
+def _people(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
+    guessed = of.guess is None
+    rows = tuple(
+        (one.participant, *_cells(found, condition.levels), f"{one.trials:,}", *_own(one, digits, guessed=guessed))
+        for condition in of.conditions
+        for one in condition.people
+    )
+    cut = len(rows) > LISTED
+    kept = f" (the first {SHOWN} of {len(rows):,}; all are in statistics.json)" if cut else ""
+    return Table(
+        caption=f"{asked}: each participant's own fit{kept}; p: how often data of such a function deviate as much",
+        header=(
+            "Participant",
+            *(("Condition",) if of.conditions[0].levels else ()),
+            *("Trials", _measure(of).capitalize(), "95 % interval", "Pooled", "JND", "95 % interval", "Slope", "Lapse"),
+            *(("Guess",) if guessed else ()),
+            *("p", "Remark"),
+        ),
+        rows=rows[:SHOWN] if cut else rows,
+    )
+
+
+def _own(one: PersonFit, digits: int, *, guessed: bool) -> tuple[str, ...]:
+    fit = one.fit
+    if fit is None:
+        return (*(apa.NO_NUMBER,) * (8 + guessed), one.reason or "")
+    return (
+        *_estimate(fit.threshold, digits),
+        apa.number(None if one.pooled is None else one.pooled.median, digits),
+        *_estimate(fit.jnd, digits),
+        f"{fit.slope.median:.3g}".replace("-", "−"),
+        apa.below_one(fit.lapse.median),
+        *((apa.below_one(fit.guess.median),) if guessed else ()),
+        apa.p_cell(fit.goodness.p),
+        one.reason or "",
+    )
+
+
+def _estimate(found: Credible, digits: int) -> tuple[str, str]:
+    return apa.number(found.median, digits), _ends(found, digits)
+
+
+def _ends(found: Credible, digits: int) -> str:
+    return apa.interval(found.low, found.high, digits)
+
+
+def _digits(of: Thresholds) -> int:
+    """So many decimals that the span of the levels has three figures."""
+    levels = [point.level for one in of.conditions for point in one.points]
+    span = max(levels) - min(levels)
+    return min(max(2 - math.floor(math.log10(span)), 0), 9) if span > 0 else 2

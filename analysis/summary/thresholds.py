@@ -1,0 +1,255 @@
+"""The psychometric functions of a design: which answers tell of them, whose they are, and what differs.
+
+Of a question with right answers the share of these is fitted over the levels of a numeric factor, with chance as the
+guess rate; of yes or no the share of yes, the guess rate with it; of a comparison with a standard how often the level
+was chosen, whose threshold is the point of subjective equality. Other factors make conditions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from analysis.psychometric.people import (
+    GroupFit,
+    PersonFit,
+    ShareAtLevel,
+    ThresholdDifference,
+    person_fit,
+    threshold_difference,
+    with_group,
+)
+from analysis.psychometric.priors import default_priors
+from analysis.report.serial import beside
+from analysis.stats.arrays import FloatArray
+from experiments.design.config import DesignConfig
+from experiments.design.language import INTERVAL_NAMES, YES, Level, QuestionConfig, shown_level
+from experiments.tasks.questions import chance, correct_columns
+
+MOST_FITTED, MOST_FITS = 40, 60
+"""So many people, and functions, are fitted unless all are asked for: a function takes 10 to 40 ms."""
+MOST_COMPARED = 10
+"""Of more conditions the pairs fill pages that nobody reads."""
+_FALLS = -3.0
+"""In so many standard errors: the share is taken to fall with the level."""
+
+FittedShare = Literal["right", "yes", "chosen"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionFit:
+    """One condition: everybody's trials together, the people who were fitted, and the group behind them."""
+
+    levels: Mapping[str, Level]
+    points: tuple[ShareAtLevel, ...]
+    people: tuple[PersonFit, ...]
+    group: GroupFit | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionDifference:
+    """The threshold in condition `a` less that in `b`."""
+
+    a: Mapping[str, Level]
+    b: Mapping[str, Level]
+    threshold: ThresholdDifference = field(metadata=beside(ThresholdDifference))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thresholds:
+    """The psychometric functions of one question over `factor`; none with a `reason`.
+
+    `share`: of what, right answers, yes, or the level chosen over the standard. `guess`: chance where the design knows
+    it. Of the `people` so many were `fitted`. `even`: trials whose two intervals had the same level.
+    """
+
+    factor: str
+    share: FittedShare
+    guess: float | None = None
+    falling: bool = False
+    standard: Level | None = None
+    people: int = 0
+    fitted: int = 0
+    even: int = 0
+    conditions: tuple[ConditionFit, ...] = ()
+    differences: tuple[ConditionDifference, ...] = ()
+    reason: str | None = None
+
+
+def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybody: bool = False) -> Thresholds | None:
+    """The functions of a question from the table of its design; `None` of one that has none.
+
+    `everybody`: all people are fitted, however many, not some spread evenly over their codes.
+    """
+    question, factor = design.questions[name], numeric_factor(design)
+    share = None if factor is None else _share(design, question)
+    if factor is None or share is None:
+        return None
+    known = chance(question) if share == "right" else None
+    standard = design.trial.standard if share == "chosen" else None
+    found = Thresholds(factor=factor, share=share, guess=known, standard=standard)
+    if why := _unordered(design, factor, share):
+        return replace(found, reason=why)
+    answers = _Answers(design, name, factor, share, table)
+    if not len(answers.rows):
+        return replace(found, reason="nobody answered")
+    return _fitted(answers, replace(found, even=answers.even), everybody=everybody)
+
+
+def numeric_factor(design: DesignConfig) -> str | None:
+    """The factor that a function is of: the compared one, else the first within people with three numbers or more."""
+    compared = design.trial.compare
+    names = [compared] if compared is not None else [one for one in design.factors if one not in design.between]
+    numbers = {name: _numbers(design.factors[name].all_levels) for name in names}
+    return next((name for name, some in numbers.items() if len(some) > 2), None)
+
+
+def _numbers(levels: Sequence[Level]) -> list[float]:
+    return [level for level in levels if not isinstance(level, str)]
+
+
+def _share(design: DesignConfig, question: QuestionConfig) -> FittedShare | None:
+    """What is counted of a question's answers; `None` where nothing is a success."""
+    if question.when == "block" or design.trial.kind == "pair":
+        return None
+    compares = design.trial.kind == "two-interval" and set(question.named_answers) == set(INTERVAL_NAMES[:2])
+    if compares and question.correct in {None, "larger"}:
+        return "chosen"
+    if question.kind == "yes-no" and question.correct in {None, "stimulus"}:
+        return "yes"
+    return "right" if question.correct is not None else None
+
+
+def _unordered(design: DesignConfig, factor: str, share: FittedShare) -> str:
+    """Why the share of right answers has no single function of the level; empty if it has."""
+    standard, levels = design.trial.standard, _numbers(design.factors[factor].all_levels)
+    if share == "chosen" or standard is None or isinstance(standard, str):
+        return ""
+    if min(levels) < standard < max(levels):
+        return f"the levels lie on both sides of the standard, {shown_level(standard)}: no single function rises there"
+    return ""
+
+
+class _Answers:
+    """The rows that count, with their `level` and `success`, by condition and person."""
+
+    def __init__(self, design: DesignConfig, name: str, factor: str, share: FittedShare, table: pd.DataFrame) -> None:
+        question = design.questions[name]
+        self.conditions = [
+            one
+            for one, of in design.factors.items()
+            if len(of.all_levels) > 1 and one not in {factor, question.correct}
+        ]
+        level = pd.to_numeric(table[factor], errors="coerce")
+        success = _successes(design, name, factor, share, table)
+        rows = table.assign(level=level, success=success)
+        self.even = int((success.isna() & table[name].notna() & level.notna()).sum()) if share == "chosen" else 0
+        rows = rows[rows["success"].notna()]
+        self.rows = rows[rows["level"].notna()]
+        self.catch = rows[rows["level"].isna()]
+
+    def of_people(self, codes: Sequence[Hashable]) -> Iterator[tuple[dict[str, Level], list[PersonFit]]]:
+        """The people in each condition, in the order of their codes; whoever has no trial in it is not there."""
+        mine = self.rows[self.rows["participant_id"].isin(codes)]
+        without = self.catch[self.catch["participant_id"].isin(codes)]
+        for levels, rows in _by_condition(mine, self.conditions):
+            catch = without
+            for column, level in levels.items():
+                catch = catch[catch[column].isna() | (catch[column] == level)]
+            people = rows.groupby("participant_id", sort=True, observed=True)
+            yield levels, [_person(str(who), some, catch[catch["participant_id"] == who]) for who, some in people]
+
+
+def _successes(
+    design: DesignConfig, name: str, factor: str, share: FittedShare, table: pd.DataFrame
+) -> pd.Series[float]:
+    """1, 0, or NaN of what tells nothing."""
+    given = table[name]
+    if share == "yes":
+        return (given == YES).astype(float).where(given.notna())
+    if share == "right":
+        return pd.to_numeric(table[correct_columns(design.questions)[name]], errors="coerce")
+    intervals = [pd.to_numeric(table[f"{factor}_{place}"], errors="coerce") for place in (1, 2)]
+    level = pd.to_numeric(table[factor], errors="coerce")
+    first, second = ((of == level) & ~(other == level) for of, other in (intervals, intervals[::-1]))
+    chosen = np.where(first, given == INTERVAL_NAMES[0], given == INTERVAL_NAMES[1]).astype(float)
+    return pd.Series(chosen, index=table.index).where(given.notna() & (first | second))
+
+
+def _by_condition(rows: pd.DataFrame, names: Sequence[str]) -> Iterator[tuple[dict[str, Level], pd.DataFrame]]:
+    if not names:
+        yield {}, rows
+        return
+    for levels, some in rows.groupby(list(names), sort=True, observed=True):
+        yield dict(zip(names, map(_level, levels), strict=True)), some
+
+
+def _level(value: Hashable) -> Level:
+    return value if isinstance(value, str) else float(str(value))
+
+
+def _points(rows: pd.DataFrame) -> tuple[ShareAtLevel, ...]:
+    counted = rows.groupby("level", sort=True)["success"].agg(["sum", "size"])
+    return tuple(
+        ShareAtLevel(level=float(str(level)), right=round(right), trials=int(trials))
+        for level, right, trials in counted.itertuples()
+    )
+
+
+def _person(who: str, rows: pd.DataFrame, catch: pd.DataFrame) -> PersonFit:
+    without = (round(catch["success"].sum()), len(catch)) if len(catch) else None
+    return PersonFit(participant=who, points=_points(rows), catch=without)
+
+
+def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresholds:
+    rows = answers.rows
+    codes = sorted(rows["participant_id"].unique(), key=str)
+    pooled = dict(_pooled(answers))
+    most = len(codes) if everybody else max(1, min(MOST_FITTED, MOST_FITS // len(pooled)))
+    chosen = (
+        codes if len(codes) <= most else [codes[i] for i in np.linspace(0, len(codes) - 1, most).round().astype(int)]
+    )
+    levels = rows["level"].to_numpy(dtype=np.float64)
+    if np.unique(levels).size < 2:
+        return replace(found, people=len(codes), reason="the answers are all at one level")
+    falling = found.share != "chosen" and _falls(levels, rows["success"].to_numpy(dtype=np.float64))
+    priors = default_priors(-levels if falling else levels)
+    conditions = []
+    for of, people in answers.of_people(chosen):
+        fits = [person_fit(one, guess=found.guess, falling=falling, priors=priors) for one in people]
+        whole, group = with_group(fits)
+        conditions.append(ConditionFit(levels=of, points=pooled[tuple(of.items())], people=whole, group=group))
+    return replace(
+        found,
+        falling=falling,
+        people=len(codes),
+        fitted=len(chosen),
+        conditions=tuple(conditions),
+        differences=tuple(_differences(conditions)),
+    )
+
+
+def _pooled(answers: _Answers) -> Iterator[tuple[tuple[tuple[str, Level], ...], tuple[ShareAtLevel, ...]]]:
+    for levels, rows in _by_condition(answers.rows, answers.conditions):
+        yield tuple(levels.items()), _points(rows)
+
+
+def _falls(levels: FloatArray, success: FloatArray) -> bool:
+    """Whether successes become clearly fewer with the level."""
+    if np.ptp(levels) == 0 or np.ptp(success) == 0:
+        return False
+    return bool(np.corrcoef(levels, success)[0, 1] * np.sqrt(levels.size) < _FALLS)
+
+
+def _differences(conditions: Sequence[ConditionFit]) -> Iterator[ConditionDifference]:
+    if len(conditions) > MOST_COMPARED:
+        return
+    for one, other in combinations(conditions, 2):
+        found = threshold_difference(one.people, other.people, (one.group, other.group))
+        if found is not None:
+            yield ConditionDifference(a=one.levels, b=other.levels, threshold=found)

@@ -1,0 +1,224 @@
+"""Psychometric functions of designs: which answers count, whose they are, conditions, differences, and the pages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm
+
+from analysis.psychometric.people import PersonFit
+from analysis.summary.designs import summarise
+from analysis.summary.figures.functions import figure_functions
+from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
+from analysis.summary.thresholds import MOST_FITTED, Thresholds, thresholds
+from experiments.design.config import DesignConfig
+from tests.designs import design
+from tests.tables_of_designs import loaded, simulated
+
+LEVELS = (6.0, 8.0, 10.0, 12.0, 14.0)
+
+
+def share(level: Any, threshold: float, sd: float = 1.5) -> Any:
+    return norm.cdf((np.asarray(level) - threshold) / sd)
+
+
+def answered(config: DesignConfig, truths: dict[tuple[str, str], float], trials: int = 40) -> pd.DataFrame:
+    """Right answers of people (code, method) with a threshold each, as often as the function has it, without chance."""
+    rows = [
+        {"participant_id": who, "method": method, "voltage_V": level, "direction": "forward"}
+        | {"response": "forward" if right else "backward", "correct": int(right)}
+        for (who, method), threshold in truths.items()
+        for level in LEVELS
+        for right in np.arange(trials) < round(trials * (0.5 + 0.5 * share(level, threshold)))
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def config() -> DesignConfig:
+    return design(
+        factors={
+            "method": {"levels": ["asymmetric-1", "asymmetric-2"]},
+            "voltage_V": {"levels": list(LEVELS)},
+            "direction": {"levels": ["forward", "backward"]},
+        },
+        questions={
+            "response": {
+                "kind": "choice",
+                "text": "Which way?",
+                "answers": ["forward", "backward"],
+                "correct": "direction",
+            }
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def of_two(config: DesignConfig) -> pd.DataFrame:
+    """Two people, whose threshold with the second method is 2 V higher."""
+    truths = {(who, method): at + 2 * (method == "asymmetric-2") for who, at in (("A", 9.0), ("B", 9.4))
+              for method in ("asymmetric-1", "asymmetric-2")}  # fmt: skip
+    return answered(config, truths)
+
+
+@pytest.fixture(scope="module")
+def found(config: DesignConfig, of_two: pd.DataFrame) -> Thresholds:
+    one = thresholds(config, "response", of_two)
+    assert one is not None
+    return one
+
+
+def test_a_scored_choice_has_chance_as_its_guess_rate_and_a_function_each_condition(found: Thresholds) -> None:
+    assert (found.factor, found.share, found.guess, found.falling) == ("voltage_V", "right", 0.5, False)
+    assert [one.levels for one in found.conditions] == [{"method": "asymmetric-1"}, {"method": "asymmetric-2"}]
+    first = found.conditions[0]
+    assert [one.participant for one in first.people] == ["A", "B"]
+    assert [point.trials for point in first.points] == [80] * len(LEVELS)
+    assert first.people[0].fit is not None
+    assert first.people[0].fit.threshold.median == pytest.approx(9.0, abs=0.5)
+
+
+def test_the_difference_of_two_conditions_is_that_of_the_same_people(found: Thresholds) -> None:
+    (one,) = found.differences
+    assert (one.a, one.b) == ({"method": "asymmetric-1"}, {"method": "asymmetric-2"})
+    assert (one.threshold.people, one.threshold.within) == (2, True)
+    assert one.threshold.difference.low < -2 < one.threshold.difference.high < 0
+
+
+def test_of_two_groups_it_is_that_of_their_means(config: DesignConfig) -> None:
+    truths = {("A", "asymmetric-1"): 9.0, ("B", "asymmetric-1"): 9.2}
+    truths |= {("C", "asymmetric-2"): 11.1, ("D", "asymmetric-2"): 11.3}
+    one = thresholds(config, "response", answered(config, truths))
+    assert one is not None
+    (between,) = one.differences
+    assert (between.threshold.people, between.threshold.within) == (4, False)
+    assert between.threshold.difference.median == pytest.approx(-2.1, abs=0.6)
+
+
+def test_one_person_has_differences_and_no_group(config: DesignConfig) -> None:
+    truths = {("A", "asymmetric-1"): 9.0, ("A", "asymmetric-2"): 11.0}
+    one = thresholds(config, "response", answered(config, truths))
+    assert one is not None
+    assert {condition.group for condition in one.conditions} == {None}
+    assert one.differences[0].threshold.people == 1
+
+
+def test_answers_that_never_rise_have_no_threshold_and_say_so(config: DesignConfig) -> None:
+    truths = {("A", "asymmetric-1"): 9.0, ("B", "asymmetric-1"): 99.0}
+    one = thresholds(config, "response", answered(config, truths))
+    assert one is not None
+    never = one.conditions[0].people[1]
+    assert never.reason is not None
+    assert "no threshold within the levels" in never.reason
+    assert one.conditions[0].group is not None
+    assert one.conditions[0].group.without == 1
+
+
+def test_a_share_that_falls_with_the_level_is_fitted_as_one(config: DesignConfig, of_two: pd.DataFrame) -> None:
+    turned = of_two.assign(voltage_V=20.0 - of_two["voltage_V"])
+    rising, falling = thresholds(config, "response", of_two), thresholds(config, "response", turned)
+    assert rising is not None
+    assert falling is not None
+    assert falling.falling
+    one, other = rising.conditions[0].people[0].fit, falling.conditions[0].people[0].fit
+    assert one is not None
+    assert other is not None
+    assert other.threshold.median == pytest.approx(20.0 - one.threshold.median, abs=1e-9)
+    assert (other.threshold.low, other.threshold.high) == pytest.approx(
+        (20 - one.threshold.high, 20 - one.threshold.low)
+    )
+    assert other.slope.median == pytest.approx(-one.slope.median)
+    assert np.all(np.diff(other.curve(LEVELS)[0]) < 0)
+
+
+def test_too_few_answers_are_no_fit_and_too_many_people_are_sampled(config: DesignConfig) -> None:
+    few = answered(config, {("A", "asymmetric-1"): 9.0}, trials=1)
+    one = thresholds(config, "response", few)
+    assert one is not None
+    assert one.conditions[0].people[0].reason == "5 trials at 5 levels; a fit needs at least 10 at two levels"
+    crowd = answered(config, {(f"P{i:03d}", "asymmetric-1"): 10.0 for i in range(MOST_FITTED + 3)}, trials=1)
+    many = thresholds(config, "response", crowd)
+    assert many is not None
+    assert (many.people, many.fitted) == (MOST_FITTED + 3, MOST_FITTED)
+    assert sum(point.trials for point in many.conditions[0].points) == 5 * (MOST_FITTED + 3)
+    every = thresholds(config, "response", crowd, everybody=True)
+    assert every is not None
+    assert every.fitted == MOST_FITTED + 3
+
+
+def test_a_column_that_an_adaptive_rule_filled_is_fitted_by_its_levels(config: DesignConfig) -> None:
+    """Each trial at a level of its own, as a track goes: the truth, 10, lies in the interval."""
+    stream = np.random.default_rng(6)
+    levels = np.clip(10 + np.cumsum(stream.choice([-0.25, 0.25], 120)), 6, 14)
+    right = stream.random(120) < 0.5 + 0.48 * share(levels, 10.0)
+    table = pd.DataFrame(
+        {"participant_id": "A", "method": "asymmetric-1", "voltage_V": levels, "response": "forward", "correct": right}
+    )
+    one = thresholds(config, "response", table)
+    assert one is not None
+    fit = one.conditions[0].people[0].fit
+    assert fit is not None
+    assert fit.threshold.low < 10 < fit.threshold.high
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict[str, Any]:
+    """The summaries of the shipped designs that have functions, of two synthetic people each."""
+    made = {}
+    for name in ("detection", "stronger"):
+        one, laws = loaded(name)
+        made[name] = summarise(one, simulated(one, laws, 2))
+    return made
+
+
+def test_yes_counts_with_the_catch_trials_as_guesses(shipped: dict[str, Any]) -> None:
+    found = shipped["detection"].questions["felt"].thresholds
+    assert (found.share, found.guess) == ("yes", None)
+    person: PersonFit = found.conditions[0].people[0]
+    assert person.catch is not None
+    assert person.catch[1] == 60
+    assert person.fit is not None
+    assert person.fit.guess.median == pytest.approx(person.catch[0] / 60, abs=0.06)
+
+
+def test_a_comparison_with_a_standard_counts_how_often_the_level_was_chosen(shipped: dict[str, Any]) -> None:
+    config, laws = loaded("stronger")
+    found = shipped["stronger"].questions["stronger"].thresholds
+    assert (found.share, found.guess, found.standard) == ("chosen", None, 14.0)
+    table = simulated(config, laws, 2)
+    for point in found.conditions[0].points:
+        rows = table[table["voltage_V"] == point.level]
+        chosen = rows["correct"] if point.level > 14.0 else 1 - rows["correct"]
+        assert point.right == chosen.sum()
+
+
+def test_what_has_no_success_or_no_single_function_is_not_fitted() -> None:
+    for name in ("pairs", "magnitude", "realism", "hurry"):
+        one, laws = loaded(name)
+        table = simulated(one, laws, 1)
+        assert [thresholds(one, asked, table) for asked in one.questions] == [None] * len(one.questions)
+    stronger, laws = loaded("stronger")
+    tables = stronger.model_dump()
+    tables["questions"]["stronger"] |= {"correct": "interval"}
+    both = DesignConfig.model_validate(tables)
+    refused = thresholds(both, "stronger", simulated(both, laws, 1))
+    assert refused is not None
+    assert refused.reason is not None
+    assert "both sides of the standard, 14" in refused.reason
+
+
+def test_the_pages_have_groups_differences_people_and_a_panel_each(
+    config: DesignConfig, of_two: pd.DataFrame, tmp_path: Any
+) -> None:
+    summary = summarise(config, of_two)
+    (section,) = threshold_sections("made", summary)
+    assert [len(table.rows) for table in section.tables] == [2, 1, 4]
+    assert {len(row) for table in section.tables for row in table.rows} == {8, 5, 12}
+    assert all(len(row) == len(table.header) for table in section.tables for row in table.rows)
+    (sentence,) = threshold_sentences(summary, summary.questions["response"])
+    assert sentence.startswith("Threshold in voltage in V, mean over people: Asymmetric Force I: 9.0")
+    figure_functions(summary, summary.questions["response"].thresholds, tmp_path / "functions")  # type: ignore[arg-type]
+    assert (tmp_path / "functions.png").is_file()
