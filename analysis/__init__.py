@@ -16,6 +16,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from analysis.psychometric.fit import psychometric_fit
+    from analysis.psychometric.paired import circular_triads, paired_scores
+    from analysis.psychometric.pooling import pooled_group
     from analysis.stats.anova import (
         Anova,
         Comparison,
@@ -69,7 +72,17 @@ _NAMES = {
     "random_intercept": "random_intercept_logit",
     "studentized_range": "studentized_range_isf studentized_range_logsf studentized_range_sf",
 }
-_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+_PSYCHOMETRIC = {
+    "fit": "psychometric_fit",
+    "paired": "circular_triads paired_scores",
+    "pooling": "pooled_group",
+}
+_HOMES = {
+    name: f"analysis.{room}.{module}"
+    for room, modules in (("stats", _NAMES), ("psychometric", _PSYCHOMETRIC))
+    for module, names in modules.items()
+    for name in names.split()
+}
 
 __all__ = [
     "Anova",
@@ -81,6 +94,7 @@ __all__ = [
     "binomial_test",
     "binomial_test_log_p",
     "binomial_test_p",
+    "circular_triads",
     "clustering",
     "cohens_f",
     "cousineau_morey",
@@ -99,8 +113,11 @@ __all__ = [
     "one_way_anova_power",
     "one_way_bayes_factor",
     "outliers",
+    "paired_scores",
     "paired_t_tests",
     "planned_contrasts",
+    "pooled_group",
+    "psychometric_fit",
     "random_intercept_logit",
     "rm_anova",
     "rm_anova_bayes_factor",
@@ -124,7 +141,7 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'analysis' has no attribute {name!r}; it has {', '.join(__all__)}")
-    return getattr(import_module(f"analysis.stats.{_HOMES[name]}"), name)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from scipy.stats import norm
 
-from analysis.psychometric.paired import PairModel, consistency, paired_scores
+from analysis.psychometric.paired import PairModel, circular_triads, paired_scores
 
 GOLDEN: list[dict[str, Any]] = json.loads((Path(__file__).parent / "golden" / "choix.json").read_text())
 WINS = np.array([[0, 7, 9], [3, 0, 6], [1, 4, 0]])
@@ -36,13 +36,13 @@ def test_two_items_have_the_score_of_their_share() -> None:
     wins = [[0, 8], [2, 0]]
     assert np.diff(scored(wins))[0] == pytest.approx(-np.log(4), abs=1e-9)
     assert np.diff(scored(wins, model="thurstone"))[0] == pytest.approx(norm.ppf(0.2), abs=1e-9)
-    assert paired_scores("ab", wins).scores[0].se == pytest.approx(0.5 / np.sqrt(10 * 0.8 * 0.2), rel=1e-6)
+    assert paired_scores(list("ab"), wins).scores[0].se == pytest.approx(0.5 / np.sqrt(10 * 0.8 * 0.2), rel=1e-6)
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_ties_are_fitted_as_often_as_they_come(model: PairModel) -> None:
     """Of two items alone the model has as many parameters as there are shares: 5 over, 3 under, 2 ties."""
-    found = paired_scores("ab", [[0, 5], [3, 0]], [[0, 2], [2, 0]], model=model)
+    found = paired_scores(list("ab"), [[0, 5], [3, 0]], [[0, 2], [2, 0]], model=model)
     difference = found.scores[0].score - found.scores[1].score
     if model == "bradley-terry":
         weights = np.array([np.exp(difference / 2), np.exp(-difference / 2), found.tie])
@@ -67,7 +67,7 @@ def test_the_order_of_the_items_is_nothing(model: PairModel, order: list[int]) -
     ],
 )
 def test_items_without_scores_are_named(wins: Any, said: str) -> None:
-    found = paired_scores("abcd", wins)
+    found = paired_scores(list("abcd"), wins)
     assert found.scores == ()
     assert found.reason is not None
     assert found.reason.startswith(said)
@@ -81,12 +81,12 @@ def test_items_without_scores_are_named(wins: Any, said: str) -> None:
         ("abc", -WINS, {}, "wins must not be below 0"),
         ("abc", WINS + np.eye(3), {}, "wins must not be below 0, and 0 for an item and itself"),
         ("abc", WINS, {"ties": WINS}, "ties must be the same on both sides"),
-        ("abc", WINS, {"confidence": 0.0}, "confidence must be above 0"),
+        ("abc", WINS, {"confidence": 0.0}, "confidence must lie between 0 and 1"),
     ],
 )
 def test_counts_that_are_none_are_refused(items: str, wins: Any, more: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        paired_scores(items, wins, **more)
+        paired_scores(list(items), wins, **more)
 
 
 @given(some.integers(3, 7), some.randoms(use_true_random=False))
@@ -95,7 +95,7 @@ def test_circular_triads_are_counted_as_by_hand(n: int, draws: Any) -> None:
     for one, other in combinations(range(n), 2):
         first = draws.random() < 0.5
         wins[(one, other) if first else (other, one)] = 1
-    found = consistency(range(n), wins)
+    found = circular_triads(range(n), wins)
     by_hand = sum(
         len({(wins[a, b], wins[b, c], wins[c, a])} & {(0, 0, 0), (1, 1, 1)}) for a, b, c in combinations(range(n), 3)
     )
@@ -105,4 +105,4 @@ def test_circular_triads_are_counted_as_by_hand(n: int, draws: Any) -> None:
 
 
 def test_an_incomplete_design_has_no_coefficient() -> None:
-    assert consistency("abc", [[0, 1, 0], [0, 0, 0], [0, 0, 0]]).zeta is None
+    assert circular_triads(list("abc"), [[0, 1, 0], [0, 0, 0], [0, 0, 0]]).zeta is None

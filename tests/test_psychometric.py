@@ -117,8 +117,8 @@ def test_levels_at_shares_of_the_function(fit: PsychometricFit) -> None:
         ({"trials": [20] * 4}, "levels, right and trials must be rows of one length"),
         ({"levels": [-1.0, 0, 1, 2, 3], "log": True}, "levels must be above 0 for a logarithmic axis, not -1"),
         ({"guess": 1.0}, "guess must be at least 0 and below 1, not 1"),
-        ({"guess": float("nan")}, "guess must be at least 0 and below 1, not nan"),
-        ({"confidence": 1.0}, "confidence must be above 0 and below 1, not 1"),
+        ({"guess": float("nan")}, "guess must be finite, not nan"),
+        ({"confidence": 1.0}, "confidence must lie between 0 and 1, not 1"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused_by_name(change: dict[str, Any], said: str) -> None:
@@ -147,5 +147,5 @@ def test_catch_trials_tell_the_guess_rate() -> None:
     assert told.guess.median == pytest.approx(0.3, abs=0.03)
     assert told.guess.high - told.guess.low < (without.guess.high - without.guess.low) / 2
     assert told.reason is None
-    with pytest.raises(ValueError, match="catch must be yes answers of so many trials, not 5 of 4"):
+    with pytest.raises(ValueError, match=r"catch must be two whole numbers, .*, not \(5, 4\)"):
         psychometric_fit(LEVELS, RIGHT, TRIALS, guess=None, catch=(5, 4))

@@ -24,6 +24,7 @@ ONE_NUMBER: dict[str, Any] = {"successes": 5, "trials": 10, "p0": 0.5, "alternat
 PAIRS: dict[str, Any] = {"scores": SCORES, "labels": ["a", "b", "c"], "confidence": 0.9}
 BOUNDS: dict[str, Any] = {"low": -1.0, "high": 3.0, "alpha": 0.05}
 TRIALS: dict[str, Any] = {"people": list("aabbcc"), "predictors": {"x": [0, 1, 0, 1, 0, 1]}, "confidence": 0.95}
+WINS = [[0, 7, 9], [3, 0, 6], [1, 4, 0]]
 RANGE: dict[str, Any] = {"k": 3, "df": 10}
 GUN = recoil.GunParameters()
 
@@ -32,6 +33,7 @@ STATISTICS: Mapping[str, Mapping[str, Any]] = {
     "binomial_test": ONE_NUMBER | {"confidence": 0.9},
     "binomial_test_log_p": ONE_NUMBER,
     "binomial_test_p": ONE_NUMBER,
+    "circular_triads": {"items": ["a", "b", "c"], "wins": WINS},
     "clustering": {"successes": [3, 4, 5], "trials": [10, 10, 10], "p0": 0.5},
     "cohens_f": {"eta_squared": 0.1},
     "cousineau_morey": {"scores": SCORES, "confidence": 0.95},
@@ -50,8 +52,30 @@ STATISTICS: Mapping[str, Mapping[str, Any]] = {
     "one_way_anova_power": {"f": 0.3, "sizes": [10, 10], "alpha": 0.05},
     "one_way_bayes_factor": {"groups": GROUPS, "fixed_scale": 0.5},
     "outliers": {"scores": SCORES, "reach": 1.5},
+    "paired_scores": {
+        "items": ["a", "b", "c"],
+        "wins": WINS,
+        "ties": [[0, 1, 0], [1, 0, 2], [0, 2, 0]],
+        "model": "thurstone",
+        "confidence": 0.9,
+    },
     "paired_t_tests": PAIRS,
     "planned_contrasts": {"scores": SCORES, "weights": {"w": [1, 0, -1]}, "correction": "holm", "confidence": 0.95},
+    "pooled_group": {"draws": [[1.0, 2.0, 2.5], [1.5, 2.0, 3.0]], "confidence": 0.9},
+    "psychometric_fit": {
+        "levels": [1.0, 2.0, 3.0],
+        "right": [3, 6, 9],
+        "trials": [10, 10, 10],
+        "guess": 0.25,
+        "lapse": 0.02,
+        "catch": (2, 10),
+        "overdispersed": False,
+        "shape": "logistic",
+        "log": False,
+        "falling": False,
+        "priors": None,
+        "confidence": 0.9,
+    },
     "random_intercept_logit": TRIALS | {"right": [0, 1, 1, 1, 0, 0], "nodes": 9},
     "rm_anova": {"scores": SCORES},
     "rm_anova_bayes_factor": {"scores": SCORES, "fixed_scale": 0.5, "random_scale": 1.0},
@@ -132,6 +156,10 @@ TAKEN = {
     "labels": {"None"},
     "reference": {"None"},
     "group": {"None"},
+    "guess": {"None"},
+    "lapse": {"None"},
+    "priors": {"None"},
+    "ties": {"None"},
     "q": {"NaN", "minus infinity", "a column with NA"},
     "p of studentized_range_isf": {"NaN"},
 }

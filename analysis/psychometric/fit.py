@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from scipy.special import xlogy
 from analysis.psychometric.grid import NAMES, LevelCounts, Posterior, posterior
 from analysis.psychometric.priors import Priors, default_priors
 from analysis.report.serial import UNWRITTEN
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, in_brief, numbers, one_of, share, single, yes_or_no
 from analysis.stats.frames import Result
 from experiments.design.procedures.psychometric import Shape, share_felt
 
@@ -135,20 +135,26 @@ def psychometric_fit(
     >>> found.where, round(found.threshold.median, 1)
     ('within', 9.5)
     """
-    axis = _LevelAxis(log=log, falling=falling)
-    counts = _counts(levels, right, trials, shape, axis)
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence must be above 0 and below 1, not {confidence:g}")
-    fixed = {} if overdispersed else {"overdispersion": 0.0}
-    for name, rate in (("guess", guess), ("lapse", lapse)):
-        if rate is not None:
-            if not 0 <= rate < 1:
-                raise ValueError(f"{name} must be at least 0 and below 1, not {rate:g}")
-            fixed[name] = float(rate)
+    axis = _LevelAxis(log=yes_or_no(log, "log"), falling=yes_or_no(falling, "falling"))
+    one_of(shape, "shape", get_args(Shape))
+    counts, level = _counts(levels, right, trials, shape, axis), share(confidence, "confidence")
+    fixed = {} if yes_or_no(overdispersed, "overdispersed") else {"overdispersion": 0.0}
+    fixed |= {name: _rate(rate, name) for name, rate in (("guess", guess), ("lapse", lapse)) if rate is not None}
+    if sum(fixed.get(name, 0.0) for name in ("guess", "lapse")) >= 1:
+        raise ValueError(f"guess and lapse must be below 1 together, not {fixed['guess']:g} and {fixed['lapse']:g}")
+    if not (priors is None or isinstance(priors, Priors)):
+        raise ValueError(f"priors must be Priors or None, not {in_brief(priors)}")
     used = _with_catch(counts, catch)
     draws = _draws(posterior(used, priors or default_priors(counts.levels), fixed))
     where, reason = _where(axis.back(counts.levels), axis.back(draws[:, 0]))
-    return _fit(used, draws, axis, where=where, reason=reason, confidence=confidence)
+    return _fit(used, draws, axis, where=where, reason=reason, confidence=level)
+
+
+def _rate(value: ArrayLike, name: str) -> float:
+    found = single(value, name)
+    if not 0 <= found < 1:
+        raise ValueError(f"{name} must be at least 0 and below 1, not {in_brief(value)}")
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,16 +203,17 @@ def _counts(levels: ArrayLike, right: ArrayLike, trials: ArrayLike, shape: Shape
 
 def _with_catch(counts: LevelCounts, catch: tuple[int, int]) -> LevelCounts:
     """The counts, and those of trials without a stimulus: a level so low that F is 0."""
-    yes, trials = catch
-    if not 0 <= yes <= trials <= _MOST_TRIALS:
-        raise ValueError(f"catch must be yes answers of so many trials, not {yes:g} of {trials:g}")
+    given = numbers(catch, "catch")
+    yes, trials = given.tolist() if given.shape == (2,) else (1.0, 0.0)
+    if not 0 <= yes <= trials <= _MOST_TRIALS or yes % 1 or trials % 1:
+        raise ValueError(f"catch must be two whole numbers, yes answers and of how many trials, not {in_brief(catch)}")
     if not trials:
         return counts
     return replace(
         counts,
         levels=np.append(counts.levels, -np.inf),
-        right=np.append(counts.right, float(yes)),
-        trials=np.append(counts.trials, float(trials)),
+        right=np.append(counts.right, yes),
+        trials=np.append(counts.trials, trials),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from scipy.sparse.csgraph import connected_components
 from scipy.special import log_expit, log_ndtr, logsumexp, ndtri
 
-from analysis.stats.arrays import FloatArray, numbers
+from analysis.stats.arrays import FloatArray, numbers, one_of, row_labels, share
 from analysis.stats.frames import Result
 
 PairModel = Literal["bradley-terry", "thurstone"]
@@ -76,13 +76,14 @@ def paired_scores(
     >>> [(one.item, round(one.score, 3)) for one in found.scores]
     [('a', 0.944), ('b', -0.16), ('c', -0.783)]
     """
+    items = row_labels(items, "items")
     won, tied = _checked(items, wins, "wins"), np.zeros((len(items), len(items)))
     if ties is not None:
         tied = _checked(items, ties, "ties")
         if not np.array_equal(tied, tied.T):
             raise ValueError("ties must be the same on both sides of each pair")
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence must be above 0 and below 1, not {confidence:g}")
+    one_of(model, "model", get_args(PairModel))
+    level = share(confidence, "confidence")
     if reason := _not_connected(items, won + tied / 2):
         return PairedScores(model=model, reason=reason)
     free = len(items) - 1 + bool(tied.any())
@@ -90,7 +91,7 @@ def paired_scores(
     covariance = np.linalg.inv(_curvature(lambda at: -_log_likelihood(at, won, tied, model), fit))
     basis = _basis(len(items))
     scores, spread = basis @ fit[: len(items) - 1], basis @ covariance[: len(items) - 1, : len(items) - 1] @ basis.T
-    z, ses = float(ndtri((1 + confidence) / 2)), np.sqrt(np.diag(spread))
+    z, ses = float(ndtri((1 + level) / 2)), np.sqrt(np.diag(spread))
     return PairedScores(
         model=model,
         scores=tuple(
@@ -102,14 +103,15 @@ def paired_scores(
     )
 
 
-def consistency(items: Sequence[Hashable], wins: ArrayLike) -> Consistency:
+def circular_triads(items: Sequence[Hashable], wins: ArrayLike) -> Consistency:
     """How consistent one person's choices are; a pair is decided for the item that was chosen more often.
 
     ζ = 1 - 24 d / (n³ - n) for odd n, 1 - 24 d / (n³ - 4 n) for even n (Kendall and Babington Smith 1940).
 
-    >>> consistency("abc", [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    >>> circular_triads(["a", "b", "c"], [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
     Consistency(triads=1, circular=1, zeta=0.0)
     """
+    items = row_labels(items, "items")
     won, n = _checked(items, wins, "wins"), len(items)
     above = (won > won.T).astype(float)
     decided = above + above.T

@@ -15,10 +15,12 @@ import numpy as np
 
 from analysis.psychometric.fit import Credible
 from analysis.report.serial import UNWRITTEN
-from analysis.stats.arrays import FloatArray
+from analysis.stats.arrays import FloatArray, in_brief, numbers, share
 from analysis.stats.frames import Result
 
 _CELLS, _MEANS, _SPREADS = 240, 80, 40
+_LARGEST = 1e100
+"""Of a draw: squares of larger ones are no numbers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,15 +37,14 @@ class Group(Result):
 def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group:
     """The group behind draws (n,) of each person's value, from fits whose priors were flat where the draws are.
 
-    `ValueError`: fewer than two people.
+    `ValueError`: fewer than two people, or somebody without draws.
 
     >>> own = [np.random.default_rng(i).normal(10 + i, 1, 500) for i in range(4)]
     >>> found = pooled_group(own)
     >>> round(found.mean.median, 1), bool(found.people[0].median > np.median(own[0]))
     (11.4, True)
     """
-    if len(draws) < 2:
-        raise ValueError(f"draws must hold those of at least two people, not of {len(draws)}")
+    draws, level = _people(draws), share(confidence, "confidence")
     values, own = _histograms(draws)
     medians = np.array([np.median(one) for one in draws])
     scale = max(float(np.std(medians, ddof=1)), float(values[1] - values[0]))
@@ -57,11 +58,25 @@ def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group
     weights /= weights.sum()
     of_people = np.einsum("ms,msv,pv,msp->pv", weights, density, own, 1 / np.maximum(likely, 1e-300), optimize=True)
     return Group(
-        mean=_estimate(means, weights.sum(axis=1), confidence),
-        sd=_estimate(sds, weights.sum(axis=0), confidence),
-        people=tuple(_estimate(values, one, confidence) for one in of_people),
+        mean=_estimate(means, weights.sum(axis=1), level),
+        sd=_estimate(sds, weights.sum(axis=0), level),
+        people=tuple(_estimate(values, one, level) for one in of_people),
         mean_draws=_quantiles(means, weights.sum(axis=1), (np.arange(draws[0].size) + 0.5) / draws[0].size),
     )
+
+
+def _people(draws: Sequence[FloatArray]) -> list[FloatArray]:
+    if not isinstance(draws, Sequence | np.ndarray) or isinstance(draws, str | bytes):
+        raise ValueError(f"draws must be a list of each person's, not {in_brief(draws)}")
+    people = [numbers(one, f"draws[{place}]") for place, one in enumerate(draws)]
+    if len(people) < 2:
+        raise ValueError(f"draws must hold those of at least two people, not of {len(people)}")
+    for place, one in enumerate(people):
+        if one.ndim != 1 or not one.size or np.abs(one).max() > _LARGEST:
+            raise ValueError(
+                f"draws[{place}] must be a row of numbers up to {_LARGEST:g}, not of the shape {one.shape}"
+            )
+    return people
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -91,6 +91,13 @@ def scale_number(value: ArrayLike, name: str) -> float:
     return found
 
 
+def yes_or_no(value: object, name: str) -> bool:
+    """`value` if it is True or False, else `ValueError` naming it."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, not {in_brief(value)}")
+    return bool(value)
+
+
 def one_of(value: object, name: str, options: Sequence[str]) -> str:
     """`value` if it is one of the words, else `ValueError` naming it and them."""
     if not isinstance(value, str) or value not in options:

@@ -42,9 +42,9 @@ _PARTS = 4
 class Request:
     """What is asked for: the logs, where to write, and the files that say how to read and what to leave out.
 
-    `fits`: with the diffusion model fitted to response times, and psychometric functions of everybody. `title` of the report: what was read, unless given;
-    `extra` sections of it stand behind the results. Unless `against_frozen`, no deviation from a preregistration is
-    looked for.
+    `fits`: with the diffusion model fitted to response times, and psychometric functions to everybody. `title` of the
+    report: what was read, unless given; `extra` sections of it stand behind the results. Unless `against_frozen`, no
+    deviation from a preregistration is looked for.
     """
 
     paths: Sequence[Path]

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from analysis.summary.designs import MOST_COMPARED, MOST_FACTORS, varied
+from analysis.summary.designs import MOST_FACTORS, varied
+from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig
 from experiments.tasks.questions import chance
