@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
 from analysis.stats.anova import PairStatistics, check_scores, pairs_of, pooled_pairs, rm_anova
@@ -122,7 +122,7 @@ def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tu
     >>> [round(x, 4) for x in wilson_interval(2, 10)]
     [0.0567, 0.5098]
     """
-    z = float(special.ndtri(0.5 + confidence / 2.0))
+    z = float(scipy.special.ndtri(0.5 + confidence / 2.0))
     share = successes / trials
     centre = share + z * z / (2.0 * trials)
     half = z * math.sqrt(share * (1.0 - share) / trials + z * z / (4.0 * trials * trials))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment
 from analysis.paper.recurrence import PatternOdds, Recurrence, answers_recur, odds_of, recurs
@@ -57,7 +57,7 @@ def direction_counts(
     says_forward = [[felt_probit(law, method, way) for way in DIRECTIONS] for method in drawn.methods]
     felt = bias_mean(law) + effect * np.array(says_forward)
     towards = np.array([1.0, -1.0])  # a correct answer is "forward" on forward trials, not "forward" on backward ones
-    correct = ndtr(towards * (felt + bias) + ability)
+    correct = scipy.special.ndtr(towards * (felt + bias) + ability)
     return draws.binomial(drawn.trials, correct)
 
 

@@ -12,8 +12,8 @@ from itertools import combinations
 from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, float_or_array, in_brief, row_labels, share
 from analysis.stats.frames import GroupTable, Label, Result, Results, ScoreTable, named_groups, named_scores
@@ -171,7 +171,7 @@ def _anova(sums: Sums) -> Anova:
         F=float_or_array(F),
         df_effect=sums.df_effect,
         df_error=sums.df_error,
-        p=float_or_array(special.fdtrc(sums.df_effect, sums.df_error, F)),
+        p=float_or_array(scipy.special.fdtrc(sums.df_effect, sums.df_error, F)),
         ss_effect=effect,
         ss_error=error,
         ms_error=ms_error,

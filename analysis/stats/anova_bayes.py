@@ -19,9 +19,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
-from scipy.optimize import minimize
 
 from analysis.stats.anova import F_UNDEFINED, NO_ERROR, check_groups, check_scores, one_table
 from analysis.stats.arrays import FloatArray, scale_number
@@ -167,7 +166,7 @@ def _log_likelihood(factors: Sequence[_Factor], error: float, values: int) -> fl
 def _log_inverse_gamma(log_g: FloatArray, scale: float) -> FloatArray:
     """Log density of log g, where g has the inverse gamma distribution (1/2, scale^2/2)."""
     half = scale**2 / 2.0
-    found: FloatArray = 0.5 * math.log(half) - special.gammaln(0.5) - 0.5 * log_g - half * np.exp(-log_g)
+    found: FloatArray = 0.5 * math.log(half) - scipy.special.gammaln(0.5) - 0.5 * log_g - half * np.exp(-log_g)
     return found
 
 
@@ -183,13 +182,13 @@ def _log_integral(log_density: Callable[..., FloatArray], axes: int) -> float:
     heights = log_density(*grids)
     place = np.unravel_index(int(np.argmax(heights)), heights.shape)
     start = _GRID[np.array(place)]
-    search: Any = minimize  # its stubs do not know the method's options
+    search: Any = scipy.optimize.minimize  # its stubs do not know the method's options
     found = search(lambda x: -float(log_density(*x)), start, method="Nelder-Mead", options={"xatol": 1e-4})
     peak = np.asarray(found.x, dtype=np.float64)
     rules = [_panels(log_density, peak, axis) for axis in range(axes)]
     points = np.meshgrid(*(points for points, _ in rules), indexing="ij", sparse=True)
     weights = np.meshgrid(*(np.log(weights) for _, weights in rules), indexing="ij", sparse=True)
-    return float(special.logsumexp(log_density(*points) + sum(weights)))
+    return float(scipy.special.logsumexp(log_density(*points) + sum(weights)))
 
 
 def _panels(

@@ -8,8 +8,8 @@ whose power is enough.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, float_or_array, in_brief, numbers
 
@@ -99,6 +99,6 @@ def _power(noncentrality: FloatArray, df_effect: FloatArray, df_error: FloatArra
     level = numbers(alpha, "alpha")
     if ((level <= 0.0) | (level >= 1.0)).any():
         raise ValueError(f"alpha must lie between 0 and 1, not {in_brief(alpha)}")
-    critical = special.fdtri(df_effect, df_error, 1.0 - level)
-    power = 1.0 - special.ncfdtr(df_effect, df_error, np.minimum(noncentrality, MOST_NONCENTRALITY), critical)
+    critical = scipy.special.fdtri(df_effect, df_error, 1.0 - level)
+    power = 1.0 - scipy.special.ncfdtr(df_effect, df_error, np.minimum(noncentrality, MOST_NONCENTRALITY), critical)
     return float_or_array(np.where(noncentrality > 0.0, power, level))

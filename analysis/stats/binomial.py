@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, by_case, float_or_array, numbers, one_of, share, together
 from analysis.stats.binomial_tail import LongArray, log_between, log_pmf, tail_over_pmf
@@ -253,7 +253,7 @@ def wilson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, Float
     These are the roots of (n + z^2) p^2 - (2 k + z^2) p + k^2 / n = 0; the lower is taken from the product of the two,
     where nothing cancels. Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
     """
-    z = -float(special.ndtri(tail))
+    z = -float(scipy.special.ndtri(tail))
     upper = k + z * z / 2.0 + z * np.sqrt(k * (n - k) / n + z * z / 4.0)
     return k * (k / n) / upper, np.where(k == n, 1.0, upper / (n + z * z))
 
@@ -308,5 +308,5 @@ def _rate_and_z(counts: FloatArray, totals: FloatArray, name: str, of: str) -> t
     if (counts != np.floor(counts)).any() or (totals != np.floor(totals)).any():
         raise ValueError(f"{name} and {of} must be whole numbers, counts and not rates")
     rest = totals - counts
-    z = special.ndtri((np.minimum(counts, rest) + 0.5) / (totals + 1.0))
+    z = scipy.special.ndtri((np.minimum(counts, rest) + 0.5) / (totals + 1.0))
     return (counts + 0.5) / (totals + 1.0), np.where(counts > rest, -z, z)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
+import scipy
 
 from analysis.stats.anova import check_scores, one_table, own_pairs
 from analysis.stats.arrays import FloatArray, in_brief, numbers, share
@@ -96,12 +96,12 @@ def _contrast(scores: FloatArray, name: str, weights: FloatArray, confidence: fl
     if not math.isfinite(q):
         return replace(found, reason=CONSTANT if estimate else EQUAL)
     t = math.copysign(q / math.sqrt(2.0), estimate)
-    half = -float(special.stdtrit(n - 1, tail)) * se
+    half = -float(scipy.special.stdtrit(n - 1, tail)) * se
     return replace(
         found,
         se=se,
         t=t,
-        p=2.0 * float(special.stdtr(n - 1, -abs(t))),
+        p=2.0 * float(scipy.special.stdtr(n - 1, -abs(t))),
         ci_low=estimate - half,
         ci_high=estimate + half,
         d_z=t / math.sqrt(n),

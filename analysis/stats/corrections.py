@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from analysis.stats.arrays import FloatArray, numbers, one_of
 
@@ -41,7 +41,7 @@ def benjamini_hochberg(p: ArrayLike) -> FloatArray:
     [0.03, 0.04, 0.04]
     """
     array = _p_values(p)
-    return np.asarray(stats.false_discovery_control(array, method="bh")) if array.size else array
+    return np.asarray(scipy.stats.false_discovery_control(array, method="bh")) if array.size else array
 
 
 def corrected(p: ArrayLike, correction: Correction) -> FloatArray:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy import special, stats
-from scipy.optimize import brentq
+import scipy
 
 from analysis.stats.anova import RepeatedMeasuresAnova, check_scores, one_table, rm_anova, scores_and_names
 from analysis.stats.arrays import FloatArray, in_brief, pingouin, scale_number, share
@@ -101,10 +100,10 @@ def normality(scores: ScoreTable) -> Normality:
     if not rest.any():
         return Normality(n=rest.size, reason=NO_RESIDUALS)
     rest = rest / np.abs(rest).max()
-    skewness, kurtosis = float(stats.skew(rest)), float(stats.kurtosis(rest))
+    skewness, kurtosis = float(scipy.stats.skew(rest)), float(scipy.stats.kurtosis(rest))
     if rest.size > SHAPIRO_UP_TO:
         return Normality(n=rest.size, skewness=skewness, excess_kurtosis=kurtosis, reason=TOO_MANY)
-    W, p = stats.shapiro(rest)
+    W, p = scipy.stats.shapiro(rest)
     return Normality(W=float(W), p=float(p), n=rest.size, skewness=skewness, excess_kurtosis=kurtosis)
 
 
@@ -235,7 +234,7 @@ def _full(wide: pd.DataFrame) -> bool:
 def _corrected(scores: FloatArray, epsilon: float) -> Corrected:
     anova = rm_anova(scores)
     df = (epsilon * anova.df_effect, epsilon * anova.df_error)
-    return Corrected(epsilon=epsilon, df=df, p=float(special.fdtrc(*df, anova.F)))
+    return Corrected(epsilon=epsilon, df=df, p=float(scipy.special.fdtrc(*df, anova.F)))
 
 
 NO_ERROR_VARIANCE = (
@@ -311,9 +310,13 @@ def _noncentrality(F: float, df_effect: int, df_error: int, p: float) -> float:
     """The lambda at which P(F' <= F) = p; 0 where even the central F lies below p."""
 
     def excess(noncentrality: float) -> float:
-        return float(special.ncfdtr(df_effect, df_error, noncentrality, F)) - p
+        return float(scipy.special.ncfdtr(df_effect, df_error, noncentrality, F)) - p
 
-    return float(brentq(excess, 0.0, _above(excess, F * df_effect), xtol=1e-10)) if excess(0.0) > 0.0 else 0.0
+    return (
+        float(scipy.optimize.brentq(excess, 0.0, _above(excess, F * df_effect), xtol=1e-10))
+        if excess(0.0) > 0.0
+        else 0.0
+    )
 
 
 def _above(excess: Callable[[float], float], start: float) -> float:
@@ -355,7 +358,7 @@ def cousineau_morey(scores: ScoreTable, confidence: float = 0.95) -> WithinSubje
     """
     array, names = scores_and_names(scores)
     n, k = one_table(array).shape
-    t = special.stdtrit(n - 1, 0.5 + share(confidence, "confidence") / 2.0)
+    t = scipy.special.stdtrit(n - 1, 0.5 + share(confidence, "confidence") / 2.0)
     spread = np.sqrt(np.square(residuals(array)).sum(axis=0) / (n - 1))
     exponent = np.frexp(np.abs(array).max())[1]
     half = np.ldexp(t * spread / math.sqrt(n) * math.sqrt(k / (k - 1)), exponent)

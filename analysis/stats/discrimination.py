@@ -19,9 +19,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
-from scipy.optimize import elementwise
 
 from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, one_of, whole
 from analysis.stats.frames import Result
@@ -38,17 +37,17 @@ _AREA = 4.5 * _WEIGHTS * np.exp(-(_Z**2) / 2.0) / np.sqrt(2.0 * np.pi)
 
 
 def _two_interval(d: FloatArray) -> FloatArray:
-    return np.asarray(special.ndtr(d / np.sqrt(2.0)))
+    return np.asarray(scipy.special.ndtr(d / np.sqrt(2.0)))
 
 
 def _abx(d: FloatArray) -> FloatArray:
-    one, other = special.ndtr(d / np.sqrt(2.0)), special.ndtr(d / np.sqrt(6.0))
+    one, other = scipy.special.ndtr(d / np.sqrt(2.0)), scipy.special.ndtr(d / np.sqrt(6.0))
     return np.asarray(one * other + (1.0 - one) * (1.0 - other))
 
 
 def _oddity(d: FloatArray) -> FloatArray:
     shift, out = d[..., None] * np.sqrt(2.0 / 3.0), -_Z * np.sqrt(3.0)
-    return np.asarray(2.0 * ((special.ndtr(out + shift) + special.ndtr(out - shift)) @ _AREA))
+    return np.asarray(2.0 * ((scipy.special.ndtr(out + shift) + scipy.special.ndtr(out - shift)) @ _AREA))
 
 
 _RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {
@@ -93,6 +92,8 @@ def discrimination(right: int, trials: int, task: Task) -> Discrimination:
     >>> round(float(discrimination(76, 100, "two-interval").d_prime), 3)
     0.999
     """
+    from scipy.optimize import elementwise  # noqa: PLC0415 - the heavy import waits until there are answers
+
     trials = whole(trials, "trials", 1)
     right = whole(right, "right", 0, trials)
     share_of, corrected = _right(task), right in (0, trials)

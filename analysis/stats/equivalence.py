@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from analysis.stats.anova import own_pairs
 from analysis.stats.arrays import FloatArray, in_brief, numbers, single
@@ -129,8 +129,8 @@ def _tests(mean_se_df: tuple[float, float, float], bounds: tuple[float, float], 
     if se == 0.0:
         return replace(found, reason=NO_VARIANCE)
     t_low, t_high = (difference - low) / se, (difference - high) / se
-    p_low, p_high = float(special.stdtr(df, -t_low)), float(special.stdtr(df, t_high))
-    half = -float(special.stdtrit(df, alpha)) * se
+    p_low, p_high = float(scipy.special.stdtr(df, -t_low)), float(scipy.special.stdtr(df, t_high))
+    half = -float(scipy.special.stdtrit(df, alpha)) * se
     return replace(
         found,
         se=se,

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from itertools import chain, combinations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import helmert
-from scipy.stats import f as f_distribution
 
 from analysis.stats.arrays import FloatArray, in_brief, row_labels
 from analysis.stats.frames import Result, Results, ScoreTable, named_scores
@@ -116,7 +115,7 @@ def _subsets(count: int) -> Iterator[tuple[int, ...]]:
 def _stratum(scores: FloatArray, groups: NDArray[np.str_], factors: tuple[int, ...]) -> _Stratum:
     """Orthonormal contrasts of these factors, of the mean over all others."""
     parts = [
-        helmert(levels) if place in factors else np.full((1, levels), levels**-0.5)
+        scipy.linalg.helmert(levels) if place in factors else np.full((1, levels), levels**-0.5)
         for place, levels in enumerate(scores.shape[1:])
     ]
     contrasts: FloatArray = np.ones((1, 1))
@@ -135,8 +134,8 @@ def _effect(source: tuple[str, ...], stratum: _Stratum, explained: float, df: in
         source=source,
         F=F,
         df=(df, df_error),
-        p=float(f_distribution.sf(F, df, df_error)),
+        p=float(scipy.stats.f.sf(F, df, df_error)),
         epsilon=epsilon,
-        p_gg=None if epsilon is None else float(f_distribution.sf(F, epsilon * df, epsilon * df_error)),
+        p_gg=None if epsilon is None else float(scipy.stats.f.sf(F, epsilon * df, epsilon * df_error)),
         size=explained / (explained + all_left) if explained + all_left > 0 else math.nan,
     )

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, by_row, in_brief, numbers, one_of, row_labels
 from analysis.stats.frames import Result, Results
@@ -103,12 +103,12 @@ def coefficients(
     names: Sequence[str], estimates: FloatArray, se: FloatArray, confidence: float
 ) -> Results[Coefficient]:
     """Wald tests and intervals of estimates (p,) with their standard errors (p,)."""
-    z, half = estimates / se, -float(special.ndtri((1.0 - confidence) / 2.0)) * se
+    z, half = estimates / se, -float(scipy.special.ndtri((1.0 - confidence) / 2.0)) * se
     rows = by_row(
         estimate=estimates,
         se=se,
         z=z,
-        p=2.0 * special.ndtr(-np.abs(z)),
+        p=2.0 * scipy.special.ndtr(-np.abs(z)),
         ci_low=estimates - half,
         ci_high=estimates + half,
     )

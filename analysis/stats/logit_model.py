@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from analysis.stats.anova import condition_names, pairs_of
 from analysis.stats.arrays import FloatArray, by_row, numbers, share
@@ -63,7 +63,7 @@ def clustering(successes: ArrayLike, trials: ArrayLike, p0: float = 0.5) -> Clus
     design_effect = 1.0 + (float((m**2).sum() / m.sum()) - 1.0) * icc
     variance = max(design_effect, 1.0) * chance * (1.0 - chance) / float(m.sum())
     t = abs(float(y.sum() / m.sum()) - chance) / math.sqrt(variance)
-    p = 2.0 * float(special.stdtr(m.size - 1, -t))
+    p = 2.0 * float(scipy.special.stdtr(m.size - 1, -t))
     return Clustering(icc=icc, design_effect=design_effect, p_adjusted=p)
 
 
@@ -183,7 +183,7 @@ def logit_model(
     rates = right / total
     influence = (y - n * rates) / (1.0 - n / total) / (total * rates * (1.0 - rates))
     covariance = influence.T @ influence
-    log_odds = special.logit(rates)
+    log_odds = scipy.special.logit(rates)
     contrasts = _contrasts(log_odds, covariance, (len(y) - 1, confidence), labels)
     if contrasts is None:
         return LogitModel(reason=NO_SPREAD)
@@ -211,7 +211,7 @@ def _conditions(
 ) -> tuple[Odds, ...]:
     se = np.sqrt(np.diag(covariance))
     half = _critical(*df_and_confidence) * se
-    low, rate, high = (special.expit(value) for value in (log_odds - half, log_odds, log_odds + half))
+    low, rate, high = (scipy.special.expit(value) for value in (log_odds - half, log_odds, log_odds + half))
     rows = by_row(rate=rate, ci_low=low, ci_high=high, log_odds=log_odds, se=se)
     return tuple(Odds(label=label, **row) for label, row in zip(labels, rows, strict=True))
 
@@ -227,7 +227,7 @@ def _contrasts(
         return None
     se, df = np.sqrt(variance), df_and_confidence[0]
     t = difference / se
-    p = 2.0 * special.stdtr(df, -np.abs(t))
+    p = 2.0 * scipy.special.stdtr(df, -np.abs(t))
     adjusted, critical = holm(p), _critical(*df_and_confidence)
     with np.errstate(over="ignore"):
         ratio, low, high = (np.exp(difference + sign * critical * se) for sign in (0.0, -1.0, 1.0))
@@ -248,8 +248,8 @@ def _equal_odds(log_odds: FloatArray, covariance: FloatArray, people: int) -> Eq
         return None
     df = (q, people - q)
     F = float(difference @ np.linalg.solve(V, difference)) * df[1] / ((people - 1) * q)
-    return EqualOdds(F=F, df=df, p=float(special.fdtrc(*df, F)))
+    return EqualOdds(F=F, df=df, p=float(scipy.special.fdtrc(*df, F)))
 
 
 def _critical(df: int, confidence: float) -> float:
-    return -float(special.stdtrit(df, (1.0 - confidence) / 2.0))
+    return -float(scipy.special.stdtrit(df, (1.0 - confidence) / 2.0))

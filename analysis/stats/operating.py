@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
+import scipy
 
 from analysis.stats.anova import PairStatistics, own_pairs, pairs_of, pooled_pairs
 from analysis.stats.arrays import FloatArray
@@ -150,7 +150,7 @@ def _between(scores: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool
 def _holm(scores: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """Paired t-tests, the smallest p against LEVEL / pairs, the next against LEVEL / (pairs - 1), until one fails."""
     pairs = own_pairs(scores)
-    p = 2.0 * special.stdtr(pairs.df, -pairs.q / math.sqrt(2.0))
+    p = 2.0 * scipy.special.stdtr(pairs.df, -pairs.q / math.sqrt(2.0))
     order = np.argsort(p, axis=-1)
     tried = np.arange(p.shape[-1], 0, -1)
     passed = np.logical_and.accumulate(np.take_along_axis(p, order, -1) * tried <= ALPHA, axis=-1)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special, stats
 
 from analysis.stats.anova import check_scores, one_table, own_pairs, pairs_of, scores_and_names
 from analysis.stats.arrays import FloatArray, by_row, numbers, pingouin, scale_number, share, single, whole
@@ -86,12 +86,12 @@ def paired_t_tests(
     n, k = one_table(array).shape
     pairs = own_pairs(array)
     t = np.sign(pairs.difference) * pairs.q / math.sqrt(2.0)
-    p = 2.0 * special.stdtr(n - 1, -np.abs(t))
+    p = 2.0 * scipy.special.stdtr(n - 1, -np.abs(t))
     there = np.isfinite(t)
     adjusted = np.full_like(p, np.nan)
     adjusted[there] = holm(p[there])
     tail = (1.0 - share(confidence, "confidence")) / 2.0
-    half = -float(special.stdtrit(n - 1, tail)) * math.sqrt(2.0) * pairs.error  # the error is on the scale of q
+    half = -float(scipy.special.stdtrit(n - 1, tail)) * math.sqrt(2.0) * pairs.error  # the error is on the scale of q
     low, high = pairs.difference - half, pairs.difference + half
     rows = by_row(t=t, p=p, p_holm=adjusted, ci_low=low, ci_high=high, d_z=t / math.sqrt(n))
     tests = [row if tested else {} for row, tested in zip(rows, there, strict=True)]
@@ -152,13 +152,13 @@ def friedman(scores: ScoreTable) -> Friedman:
     """
     array = one_table(check_scores(scores))
     n, k = array.shape
-    ranks = stats.rankdata(array, axis=1)
+    ranks = scipy.stats.rankdata(array, axis=1)
     mean_ranks = tuple(float(rank) for rank in ranks.mean(axis=0))
     if k < 3:
         return Friedman(mean_ranks=mean_ranks, reason=TWO_CONDITIONS)
     if (ranks == ranks[:1, :1]).all():
         return Friedman(mean_ranks=mean_ranks, reason=ALL_TIED)
-    chi2, p = stats.friedmanchisquare(*array.T)
+    chi2, p = scipy.stats.friedmanchisquare(*array.T)
     agreement = float(chi2) / (n * (k - 1))
     return Friedman(chi2=float(chi2), df=k - 1, p=float(p), kendall_w=agreement, mean_ranks=mean_ranks)
 
@@ -203,7 +203,7 @@ def _signed_ranks(first: FloatArray, second: FloatArray, a: Label, b: Label) -> 
     difference = difference[difference != 0.0]
     if not difference.size:
         return SignedRanks(a=a, b=b, n=0, reason=NOTHING_TO_RANK)
-    ranks = stats.rankdata(np.abs(difference))
+    ranks = scipy.stats.rankdata(np.abs(difference))
     favour, total = float(ranks[difference > 0.0].sum()), float(ranks.sum())
     smaller = min(favour, total - favour)
     exact = difference.size <= EXACT_UP_TO
@@ -214,7 +214,7 @@ def _signed_ranks(first: FloatArray, second: FloatArray, a: Label, b: Label) -> 
 
 
 def _normal_p(difference: FloatArray) -> float:
-    wilcoxon: Any = stats.wilcoxon  # its stubs do not know the method's name
+    wilcoxon: Any = scipy.stats.wilcoxon  # its stubs do not know the method's name
     return float(wilcoxon(difference, method="asymptotic").pvalue)
 
 

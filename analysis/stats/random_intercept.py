@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
-from scipy.optimize import linprog
 
 from analysis.stats.arrays import FloatArray, numbers, share, whole
 from analysis.stats.fixed_effects import Coefficient, PredictorColumns, coefficients, columns_of, people_codes
@@ -159,7 +158,7 @@ def _separating(cells: _Cells) -> NDArray[np.bool_]:
     trials = np.bincount(where.ravel(), weights=cells.trials)
     mixed = (right > 0.0) & (right < trials)
     signed = np.where(right[~mixed] > 0.0, 1.0, -1.0)[:, None] * rows[~mixed]
-    found = linprog(
+    found = scipy.optimize.linprog(
         -signed.sum(axis=0),
         A_ub=-signed if signed.size else None,
         b_ub=np.zeros(len(signed)) if signed.size else None,
@@ -176,7 +175,7 @@ def _fitted(
 ) -> RandomInterceptLogit:
     confidence, nodes = confidence_and_nodes
     start = np.zeros(cells.matrix.shape[1] + 1)
-    start[0], start[-1] = special.logit(cells.right.sum() / cells.trials.sum()), 1.0
+    start[0], start[-1] = scipy.special.logit(cells.right.sum() / cells.trials.sum()), 1.0
     theta, peak = _climbed(cells, start, np.polynomial.hermite.hermgauss(nodes))
     if abs(theta[-1]) > LARGEST_SD:
         return replace(empty, reason=RUNS_AWAY)
@@ -246,13 +245,13 @@ def _likelihood(cells: _Cells, theta: FloatArray, rule: tuple[FloatArray, FloatA
     terms = cells.right[:, None] * eta - cells.trials[:, None] * np.logaddexp(0.0, eta)
     height = np.add.reduceat(terms, cells.first, axis=0) - np.square(u) / 2.0
     height += np.log(weights) + np.square(z) + np.log(width / np.sqrt(2.0 * np.pi))
-    of_people = special.logsumexp(height, axis=1)
+    of_people = scipy.special.logsumexp(height, axis=1)
     return _with_slopes(cells, u, eta, np.exp(height - of_people[:, None]), float(of_people.sum()))
 
 
 def _with_slopes(cells: _Cells, u: FloatArray, eta: FloatArray, share: FloatArray, value: float) -> _Peak:
     """Gradient: the mean score of (b, s). Hessian: its mean Hessian, and the variance of the score."""
-    p, trials, at = special.expit(eta), cells.trials[:, None], u[cells.person]
+    p, trials, at = scipy.special.expit(eta), cells.trials[:, None], u[cells.person]
     rest, weight = cells.right[:, None] - trials * p, share[cells.person] * trials * p * (1.0 - p)
     of_people = [np.add.reduceat(rest * column[:, None], cells.first, axis=0) for column in cells.matrix.T]
     score = np.stack([*of_people, u * np.add.reduceat(rest, cells.first, axis=0)], axis=-1)
@@ -274,7 +273,7 @@ def _modes(cells: _Cells, fixed: FloatArray, sd: float) -> tuple[FloatArray, Flo
     high = abs(sd) * total + 1.0
     low, u = -high, np.zeros(people)
     for _ in range(_STEPS):
-        p = special.expit(fixed + sd * u[cells.person])
+        p = scipy.special.expit(fixed + sd * u[cells.person])
         slope = sd * np.add.reduceat(cells.right - cells.trials * p, cells.first) - u
         curvature = sd**2 * np.add.reduceat(cells.trials * p * (1.0 - p), cells.first) + 1.0
         low, high = np.where(slope > 0.0, u, low), np.where(slope > 0.0, high, u)

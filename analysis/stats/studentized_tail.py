@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy import special
+import scipy
 
 from analysis.stats.arrays import FloatArray
 
@@ -156,7 +156,7 @@ def _lower(q: FloatArray, k: float, df: FloatArray, tabled: bool) -> FloatArray:
     """The logarithm of P(Q <= q)."""
     q = np.maximum(q, SMALLEST_Q)
     mean = lower_table(k, float(df[0]))(q) if tabled else _lower_mean(q, k, df)
-    result: FloatArray = (k - 1.0) * np.log(special.erf(q / np.sqrt(8.0))) + mean
+    result: FloatArray = (k - 1.0) * np.log(scipy.special.erf(q / np.sqrt(8.0))) + mean
     return result
 
 
@@ -193,7 +193,7 @@ def _lower_mean(q: FloatArray, k: float, df: FloatArray) -> FloatArray:
     """The lower mean, log E C(qS) - (k-1) log erf(q/√8), summed in logarithms: S^(k-1) overflows at large k."""
     s, log_weight = scale_nodes(df, k, k - 1.0)
     w = q[:, None] * s
-    share = special.erf(w / np.sqrt(8.0)) / special.erf(q / np.sqrt(8.0))[:, None]
+    share = scipy.special.erf(w / np.sqrt(8.0)) / scipy.special.erf(q / np.sqrt(8.0))[:, None]
     with np.errstate(divide="ignore"):  # at df far below 1, some s are 0
         terms = log_weight + lower_table(k, np.inf)(w) + (k - 1.0) * np.log(share)
     largest = terms.max(axis=1, keepdims=True)
@@ -238,11 +238,11 @@ def range_upper(w: FloatArray, k: float) -> FloatArray:
     m = k - 1.0
     y, step = _normal_nodes(k)
     half = w[:, None] / 2.0
-    below = special.ndtr(y + half)
-    far = special.ndtr(y - half) / below
+    below = scipy.special.ndtr(y + half)
+    far = scipy.special.ndtr(y - half) / below
     with np.errstate(divide="ignore", invalid="ignore", under="ignore"):
         share = np.where(far > 0.0, -np.expm1(m * np.log1p(-far)) / far, m)
-    scaled_far = np.exp(-np.square(y)) * special.erfcx((half - y) / np.sqrt(2.0))
+    scaled_far = np.exp(-np.square(y)) * scipy.special.erfcx((half - y) / np.sqrt(2.0))
     result: FloatArray = k * step / np.sqrt(8.0 * np.pi) * np.sum(scaled_far * below ** (m - 1.0) * share, axis=1)
     return result
 
@@ -254,7 +254,7 @@ def range_lower(w: FloatArray, k: float) -> FloatArray:
     """
     z, step = _normal_nodes(k)
     w = np.minimum(w, LARGEST_W)[:, None]
-    share = _normal_mass(z - w / 2.0, w) / special.erf(w / np.sqrt(8.0))
+    share = _normal_mass(z - w / 2.0, w) / scipy.special.erf(w / np.sqrt(8.0))
     density = np.exp(-np.square(z) / 2.0) / np.sqrt(2.0 * np.pi)
     result: FloatArray = np.log(k * step * np.sum(density * share ** (k - 1.0), axis=1))
     return result
@@ -269,7 +269,7 @@ def _normal_nodes(k: float) -> tuple[FloatArray, float]:
 def _normal_mass(middle: FloatArray, width: FloatArray) -> FloatArray:
     """Φ(middle + width/2) - Φ(middle - width/2) for middle (n, z), width (n, 1), to full relative accuracy."""
     half, distance = width / 2.0, np.abs(middle)  # on the left, where Φ keeps its digits
-    mass = special.ndtr(half - distance) - special.ndtr(-half - distance)
+    mass = scipy.special.ndtr(half - distance) - scipy.special.ndtr(-half - distance)
     narrow = half[:, 0] < 0.5  # there the difference cancels
     points, weights = GAUSS_LEGENDRE
     at = distance[narrow][..., None] + half[narrow][..., None] * points

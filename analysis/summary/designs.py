@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy
 
 from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.arrays import FloatArray
@@ -357,7 +357,7 @@ def _exponent(name: str, people: pd.DataFrame) -> Iterator[DesignTest]:
     if not (levels > 0).all():
         return
     slopes = np.polyfit(np.log(levels), people.to_numpy(dtype=np.float64).T, 1)[0]
-    test = stats.ttest_1samp(slopes, 0.0)
+    test = scipy.stats.ttest_1samp(slopes, 0.0)
     low, high = test.confidence_interval()
     yield DesignTest(
         name="exponent",

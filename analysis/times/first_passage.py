@@ -30,8 +30,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, Values, float_or_array
 
@@ -158,7 +158,7 @@ def _wave_slopes(tau: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatAr
 
 _TERMS = 20
 _EVEN = 2 * np.arange(1, _TERMS + 1)
-_COTH = 2.0**_EVEN * special.bernoulli(2 * _TERMS)[2::2] / np.array([math.factorial(int(n)) for n in _EVEN])
+_COTH = 2.0**_EVEN * scipy.special.bernoulli(2 * _TERMS)[2::2] / np.array([math.factorial(int(n)) for n in _EVEN])
 """x coth x = 1 + sum of these times x^2, x^4, ...; used for |x| < 1, where 20 terms leave 1e-19 of it."""
 _H_SERIES = ((2.0 - _EVEN) * _COTH)[1:]
 """x coth x + x^2 / sinh^2 x = 2 C - x C', C = x coth x."""
@@ -263,8 +263,8 @@ def _images(tau: FloatArray, c: FloatArray, near: FloatArray) -> FloatArray:
     total, root, drift = np.zeros_like(tau), np.sqrt(tau), np.abs(c)
     for k in (0, -1, 1, -2, 2, -3):
         b = np.abs(near + 2.0 * k)
-        first = special.log_ndtr((drift * tau - b) / root) - drift * b
-        second = special.log_ndtr(-(drift * tau + b) / root) + drift * b
+        first = scipy.special.log_ndtr((drift * tau - b) / root) - drift * b
+        second = scipy.special.log_ndtr(-(drift * tau + b) / root) + drift * b
         both = np.exp(first - c * near) + np.exp(second - c * near)
         total += both if k >= 0 else -both
     return np.maximum(total, 0.0)

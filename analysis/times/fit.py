@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import optimize, special
 
 from analysis.stats.arrays import FloatArray, by_row
 from analysis.times.first_passage import distribution
@@ -109,7 +109,9 @@ def fit(
     if not peak.converged:
         covariance = np.full_like(covariance, math.nan)
     critical = -float(
-        special.stdtrit(people - 1, BEYOND_INTERVAL / 2.0) if people else special.ndtri(BEYOND_INTERVAL / 2.0)
+        scipy.special.stdtrit(people - 1, BEYOND_INTERVAL / 2.0)
+        if people
+        else scipy.special.ndtri(BEYOND_INTERVAL / 2.0)
     )
     return DiffusionFit(
         estimates=_estimates(model, peak.at, np.sqrt(np.diag(covariance)), critical),
@@ -150,7 +152,7 @@ def _beside(model: DiffusionLikelihood, near: DiffusionFit) -> FloatArray:
 def _first_drift(right: FloatArray, boundary: float) -> float:
     n = right.size
     rate = (right.sum() + 0.5) / (n + 1.0)
-    return float(special.logit(rate)) / boundary
+    return float(scipy.special.logit(rate)) / boundary
 
 
 def highest_peak(model: DiffusionLikelihood, places: list[FloatArray], held: tuple[int, float] | None = None) -> _Peak:
@@ -173,7 +175,7 @@ def _climb(model: DiffusionLikelihood, place: FloatArray, held: tuple[int, float
     ends = [_DRIFT_END] * model.drifts + [_LOG_BOUNDARY_END] * model.boundaries
     ends += [_LOGIT_END] * (at.size - len(ends))
     bounds = [(-end, end) for end, open_ in zip(ends, free, strict=True) if open_]
-    found = optimize.minimize(
+    found = scipy.optimize.minimize(
         loss,
         at[free],
         jac=True,
@@ -201,7 +203,7 @@ def _covariance(model: DiffusionLikelihood, at: FloatArray, *, by_person: bool) 
     """Covariance of the coordinates (NaN where there is none) and the names that the data do not tell."""
     matrix = information(model, at)
     seen = np.ones(at.size, dtype=np.bool_)
-    if model.lapses and special.expit(at[-1]) < EDGE:
+    if model.lapses and scipy.special.expit(at[-1]) < EDGE:
         seen[-1] = False
     seen &= np.diag(matrix) > 0.0
     seen[np.flatnonzero(seen)[_blind(matrix[np.ix_(seen, seen)])]] = False
@@ -251,7 +253,7 @@ def profile(trials: Trials, name: str, *, bias: bool = True, lapses: bool | Laps
     share of lapses that may as well be none. `KeyError`: no such parameter.
     Source: Venzon & Moolgavkar 1988, Appl. Stat. 37, 87.
     """
-    fall = float(special.chdtri(1, BEYOND_INTERVAL)) / 2.0
+    fall = float(scipy.special.chdtri(1, BEYOND_INTERVAL)) / 2.0
     model = model_of(trials, bias=bias, lapses=lapses)
     if name not in model.names:
         raise KeyError(name)
@@ -275,7 +277,7 @@ def _limit(model: DiffusionLikelihood, index: int, peak: FloatArray, wanted: flo
         if outer >= _FARTHEST:
             return _edge(model, index, sign)
         inner, outer = outer, min(2.0 * outer, _FARTHEST)
-    distance = float(optimize.brentq(excess, inner, outer, xtol=1e-5))
+    distance = float(scipy.optimize.brentq(excess, inner, outer, xtol=1e-5))
     at = np.array(peak)
     at[index] += sign * distance
     return float(natural(model, at)[index])

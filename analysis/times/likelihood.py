@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, IndexArray
 from analysis.times.first_passage import with_slopes
@@ -134,7 +134,7 @@ def natural(model: DiffusionLikelihood, at: FloatArray) -> FloatArray:
     """The parameters in their own units, from coordinates."""
     values, first, second = np.array(at), model.drifts, model.drifts + model.boundaries
     values[first:second] = np.exp(at[first:second])
-    values[second:] = special.expit(at[second:])
+    values[second:] = scipy.special.expit(at[second:])
     values[second + model.bias] = model.cap_s * min(values[second + model.bias], _TOP)
     return values
 
@@ -144,7 +144,7 @@ def coordinates(model: DiffusionLikelihood, values: FloatArray) -> FloatArray:
     at, first, second = np.array(values, dtype=np.float64), model.drifts, model.drifts + model.boundaries
     at[first:second] = np.log(at[first:second])
     at[second + model.bias] /= model.cap_s
-    at[second:] = special.logit(at[second:])
+    at[second:] = scipy.special.logit(at[second:])
     return at
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
 
 from analysis.stats.arrays import FloatArray
 from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, Estimate, fit
@@ -91,7 +91,7 @@ def mean_estimate(name: str, values: ArrayLike, alpha: float = 0.05) -> MeanEsti
     value = float(own.mean()) if n else math.nan
     sd = float(own.std(ddof=1)) if n > 1 else math.nan
     se = sd / math.sqrt(n) if n > 1 else math.nan
-    half = -float(special.stdtrit(n - 1, alpha / 2.0)) * se if n > 1 else math.nan
+    half = -float(scipy.special.stdtrit(n - 1, alpha / 2.0)) * se if n > 1 else math.nan
     return MeanEstimate(name=name, value=value, se=se, ci_low=value - half, ci_high=value + half, sd=sd, people=n)
 
 

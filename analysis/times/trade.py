@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from analysis.stats.arrays import FloatArray, numbers
 from analysis.times.first_passage import mean_form, variance_form
@@ -285,7 +285,7 @@ def ez_people(
 def _solved(accuracy: FloatArray, mean_s: FloatArray, variance_s2: FloatArray, trials: FloatArray) -> FloatArray:
     """Drift, boundary, non-decision time and the accuracy used (4, cells), of variances above 0."""
     p = np.where((accuracy == 0.0) | (accuracy == 1.0), np.abs(accuracy - 0.5 / trials), accuracy)
-    L = special.logit(p)
+    L = scipy.special.logit(p)
     boundary = (variance_s2 / (variance_form(L) - variance_form(L / 2.0) / 16.0)) ** 0.25
     non_decision_s = mean_s - boundary**2 * (mean_form(L) - mean_form(L / 2.0) / 4.0)
     return np.array([L / boundary, boundary, non_decision_s, p])

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from device.parameters import GunParameters
 
@@ -112,7 +112,7 @@ def simulate_held(gun: GunParameters, hand: HandMechanics | None = None, until_s
     for _ in range(_MAX_PHASES):
         phase = _phase(gun, hand, t, y, broke)
         limit_s = gun.pulse_s if t < gun.pulse_s < until_s else until_s
-        found: Any = solve_ivp(
+        found: Any = scipy.integrate.solve_ivp(
             phase.rates, (t, limit_s), y, _method(gun), rtol=_RTOL, atol=_ATOL, events=_events(phase), max_step=2e-3
         )
         if found.status < 0:

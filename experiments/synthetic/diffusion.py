@@ -20,8 +20,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from experiments.design.streams import Stream
 
@@ -37,8 +37,8 @@ SURE = 30.0
 _LARGEST = 1e6
 """Drift and boundary above this are refused: nobody is that cautious, and squares stay far from overflow."""
 
-LEVY_TAIL = float(special.ndtr(-1.0 / math.sqrt(_CUT)))
-"""P(N < -1/sqrt(CUT)): 1/N^2 is then below `_CUT`."""
+LEVY_TAIL = 0.10564977366685535
+"""P(N < -1/sqrt(CUT)): 1/N^2 is then below `_CUT`. As a number, so that scipy waits until something is drawn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,8 +217,8 @@ def late_shares(c: Floats) -> Floats:
     near = np.minimum(c, SURE)
     rate, root = math.pi**2 / 8.0 + near * near / 2.0, math.sqrt(2.0 * _CUT)
     p = math.pi / (2.0 * rate) * np.exp(near - rate * _CUT)
-    above = np.exp(2.0 * near) * special.erfc((1.0 + _CUT * near) / root)
-    share = p / (p + special.erfc((1.0 - _CUT * near) / root) + above)
+    above = np.exp(2.0 * near) * scipy.special.erfc((1.0 + _CUT * near) / root)
+    share = p / (p + scipy.special.erfc((1.0 - _CUT * near) / root) + above)
     return np.where(c > SURE, 0.0, share)
 
 
@@ -240,7 +240,7 @@ def _early_slow(c: Floats, draw: Draw) -> Floats:
     """
     x, wanting = np.empty_like(c), np.arange(c.size)
     while wanting.size:
-        proposed = special.ndtri(LEVY_TAIL * draw(wanting.size)) ** -2.0
+        proposed = scipy.special.ndtri(LEVY_TAIL * draw(wanting.size)) ** -2.0
         taken = draw(wanting.size) < np.exp(-(c[wanting] ** 2) * proposed / 2.0)
         x[wanting[taken]] = proposed[taken]
         wanting = wanting[~taken]
@@ -255,7 +255,7 @@ def _early_fast(c: Floats, draw: Draw) -> Floats:
     x, wanting = np.empty_like(c), np.arange(c.size)
     while wanting.size:
         mean = 1.0 / c[wanting]
-        h = mean * special.ndtri(draw(wanting.size)) ** 2 / 2.0
+        h = mean * scipy.special.ndtri(draw(wanting.size)) ** 2 / 2.0
         root = mean / (1.0 + h + np.sqrt(h * (2.0 + h)))
         smaller = draw(wanting.size) * (mean + root) <= mean
         proposed = np.where(smaller, root, mean * mean / root)

@@ -16,7 +16,7 @@ from functools import lru_cache, partial
 from itertools import accumulate
 from math import comb, floor, lgamma, log, perm
 
-from scipy import special
+import scipy
 
 from analysis.paper.audit.means import check_count
 from analysis.paper.audit.p_values import ABSOLUTE, RELATIVE
@@ -63,7 +63,7 @@ class _Trials:
         if not 0 <= k < self.n:
             return _NONE if k < 0 else _ONE
         if self.n * self.chance.denominator.bit_length() > _EXACT_BITS:
-            return _around(float(special.betaincc(k + 1, self.n - k, float(self.chance))))
+            return _around(float(scipy.special.betaincc(k + 1, self.n - k, float(self.chance))))
         sums = _sums(self.n, self.chance)
         return (Fraction(sums[k], sums[-1]),) * 2
 
@@ -121,7 +121,7 @@ def _normal(correction: Fraction, trials: _Trials, k: int) -> Bounds:
     n, chance = trials.n, trials.chance
     away = max(Fraction(0), abs(k - n * chance) - correction)
     spread = float(n * chance * (1 - chance)) ** 0.5
-    return _around(2 * float(special.ndtr(-float(away) / spread))) if away else _ONE
+    return _around(2 * float(scipy.special.ndtr(-float(away) / spread))) if away else _ONE
 
 
 @dataclass(frozen=True, slots=True)

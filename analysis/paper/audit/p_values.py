@@ -8,7 +8,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from scipy import special
+import scipy
 
 from analysis.paper.audit.printed import (
     NONE_EXISTS,
@@ -85,7 +85,9 @@ def _beta_tail(a: float, b: float, small: Fraction) -> float:
     """I(1 - small; a, b): by its complement where `small` is the argument that keeps its digits."""
     if small >= 1:
         return 0.0
-    return float(special.betaincc(b, a, float(small)) if 2 * small < 1 else special.betainc(a, b, float(1 - small)))
+    return float(
+        scipy.special.betaincc(b, a, float(small)) if 2 * small < 1 else scipy.special.betainc(a, b, float(1 - small))
+    )
 
 
 def _t_tail(x: Fraction, df: list[float]) -> float:
@@ -111,10 +113,10 @@ def _range_tail(x: Fraction, df: list[float]) -> float:
 _TAILS: dict[Statistic, Callable[[Fraction, list[float]], float]] = {
     "t": _t_tail,
     "r": _r_tail,
-    "z": lambda x, _: float(special.ndtr(-float(x))),
+    "z": lambda x, _: float(scipy.special.ndtr(-float(x))),
     "F": _f_tail,
-    "chi2": lambda x, df: float(special.chdtrc(df[0], float(x))),
-    "Q": lambda x, df: float(special.chdtrc(df[0], float(x))),
+    "chi2": lambda x, df: float(scipy.special.chdtrc(df[0], float(x))),
+    "Q": lambda x, df: float(scipy.special.chdtrc(df[0], float(x))),
     "q": _range_tail,
 }
 

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
-from scipy.optimize import brentq
 
 from analysis.predict.design_search.space import Layer, Space, shot_of
 from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, best_percept
@@ -125,7 +124,7 @@ def summary_error(designs: Designs) -> Sequence[float]:
     return [float(x) for x in np.quantile(apart, [0.5, 0.95, 1.0])] if apart.size else []
 
 
-REACH = float(special.ndtri(0.975))
+REACH = float(scipy.special.ndtri(0.975))
 _STEP = 1e-4
 
 
@@ -160,12 +159,12 @@ def logits(evidence: FloatArray, start: ArrayLike) -> FloatArray:
     with np.errstate(divide="ignore", invalid="ignore"):
         up = 2.0 * size * near + np.log(-np.expm1(-2.0 * size * near)) - np.log(-np.expm1(-2.0 * size * (1.0 - near)))
     found = np.where(np.asarray(evidence) < 0.0, -up, up)
-    return np.where(size < 1e-12, special.logit(w), found)
+    return np.where(size < 1e-12, scipy.special.logit(w), found)
 
 
 def rates(felt: FloatArray, parameters: PerceptParameters) -> FloatArray:
     """The predicted share of right answers to a forward shot."""
-    return np.asarray(special.expit(_logit_of(felt, parameters)))
+    return np.asarray(scipy.special.expit(_logit_of(felt, parameters)))
 
 
 def predict(felt: FloatArray, fit: PerceptFit) -> Predicted:
@@ -175,7 +174,7 @@ def predict(felt: FloatArray, fit: PerceptFit) -> Predicted:
     slopes = np.stack([_slope(felt, best, name) for name in FITTED], axis=-1)
     variance = np.einsum("...i,ij,...j->...", slopes, np.array(fit.covariance), slopes)
     half = REACH * np.sqrt(variance)
-    low, rate, high = (np.asarray(special.expit(x)) for x in (centre - half, centre, centre + half))
+    low, rate, high = (np.asarray(scipy.special.expit(x)) for x in (centre - half, centre, centre + half))
     evidence = evidences(felt, best.exponent, best.sensitivity, best.confusion)
     return Predicted(evidence=evidence, rate=rate, ci_low=low, ci_high=high)
 
@@ -300,7 +299,7 @@ def _solved(gun: GunParameters, volts: FloatArray, rough_V: float, parameters: P
     ends = above(low), above(high)
     if not ends[0] * ends[1] < 0.0:
         return rough_V
-    return float(brentq(above, low, high, xtol=_CLOSE_V))
+    return float(scipy.optimize.brentq(above, low, high, xtol=_CLOSE_V))
 
 
 def drawn_contours(felt: FloatArray, volts: FloatArray, fit: PerceptFit, seed: int, draws: int = DRAWS) -> FloatArray:
@@ -313,11 +312,11 @@ def drawn_contours(felt: FloatArray, volts: FloatArray, fit: PerceptFit, seed: i
     normal = generator(seed, "design", "contours").standard_normal((draws, len(FITTED)))
     moved = normal @ _root(np.array(fit.covariance)).T
     sensitivity, confusion = centre[0] * np.exp(moved[:, 0]), centre[1] * np.exp(moved[:, 1])
-    start = special.expit(special.logit(centre[2]) + moved[:, 2] / (1.0 - centre[2]))
+    start = scipy.special.expit(scipy.special.logit(centre[2]) + moved[:, 2] / (1.0 - centre[2]))
     found = np.empty((draws, len(felt)))
     for n in range(draws):
         evidence = evidences(felt, best.exponent, sensitivity[n], confusion[n])
-        found[n] = crossings(np.asarray(special.expit(logits(evidence, start[n]))), volts)
+        found[n] = crossings(np.asarray(scipy.special.expit(logits(evidence, start[n]))), volts)
     return found
 
 
@@ -429,6 +428,6 @@ def _rate(percept: Percept | None, parameters: PerceptParameters) -> float:
 def both_ways(felt: FloatArray, parameters: PerceptParameters) -> FloatArray:
     """The mean share of right answers to a forward and to a backward shot."""
     evidence = evidences(felt, parameters.exponent, parameters.sensitivity, parameters.confusion)
-    forward = special.expit(logits(evidence, parameters.start))
-    backward = special.expit(logits(evidence, 1.0 - parameters.start))
+    forward = scipy.special.expit(logits(evidence, parameters.start))
+    backward = scipy.special.expit(logits(evidence, 1.0 - parameters.start))
     return np.asarray((forward + backward) / 2.0)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import optimize, special
 
 from device.methods import Method
 from device.words import Direction
@@ -39,7 +39,7 @@ class _Likelihood:
     def at(self, place: Floats) -> PerceptParameters:
         """The parameters of a place: log sensitivity, log confusion, logit start."""
         sensitivity, confusion = np.exp(place[:2])
-        start = float(special.expit(place[2]))
+        start = float(scipy.special.expit(place[2]))
         return replace(self.base, sensitivity=float(sensitivity), confusion=float(confusion), start=start)
 
     def predicted(self, parameters: PerceptParameters) -> Floats:
@@ -52,7 +52,7 @@ class _Likelihood:
         """Signed roots of the rates' binomial deviances, whose squares sum to the deviance."""
         p = np.clip(self.predicted(self.at(place)), 1e-15, 1.0 - 1e-15)
         r = np.array(list(self.rates.values()))
-        parts = 2.0 * self.trials * (special.rel_entr(r, p) + special.rel_entr(1.0 - r, 1.0 - p))
+        parts = 2.0 * self.trials * (scipy.special.rel_entr(r, p) + scipy.special.rel_entr(1.0 - r, 1.0 - p))
         return np.asarray(np.sign(p - r) * np.sqrt(np.maximum(parts, 0.0)))
 
 
@@ -105,7 +105,9 @@ def _descent(
         return likelihood.residuals(place)
 
     inside = np.clip(place[free], _LOWEST[free] + 1e-6, _HIGHEST[free] - 1e-6)
-    found = optimize.least_squares(residuals, inside, bounds=(_LOWEST[free], _HIGHEST[free]), xtol=1e-12, ftol=1e-12)
+    found = scipy.optimize.least_squares(
+        residuals, inside, bounds=(_LOWEST[free], _HIGHEST[free]), xtol=1e-12, ftol=1e-12
+    )
     place[free] = found.x
     return place, 2.0 * float(found.cost)
 
@@ -249,13 +251,13 @@ def predicted_rate(
 
     def logit(name: str, factor: float) -> Floats:
         changed = replace(fit.parameters, **{name: getattr(fit.parameters, name) * factor})
-        return sign * special.logit(forward_rates(sign * evidence(percept, changed), changed.start, people))
+        return sign * scipy.special.logit(forward_rates(sign * evidence(percept, changed), changed.start, people))
 
     with np.errstate(invalid="ignore"):
         slopes = np.array([_slope(partial(logit, name)) for name in FITTED])
     centre, se = float(logit("start", 1.0)), float(np.sqrt(slopes @ np.array(fit.covariance) @ slopes))
-    reach = -float(special.ndtri((1.0 - CONFIDENCE) / 2.0)) * se
-    rate, low, high = (float(special.expit(x)) for x in (centre, centre - reach, centre + reach))
+    reach = -float(scipy.special.ndtri((1.0 - CONFIDENCE) / 2.0)) * se
+    rate, low, high = (float(scipy.special.expit(x)) for x in (centre, centre - reach, centre + reach))
     return Fitted(value=rate, se=rate * (1.0 - rate) * se, ci_low=low, ci_high=high)
 
 
@@ -266,7 +268,7 @@ def _inverse(matrix: Floats) -> Floats:
 
 
 def _fitted(likelihood: _Likelihood, place: Floats, deviance: float, spread: Floats) -> dict[str, Fitted]:
-    wanted = deviance + float(special.chdtri(1, 1.0 - CONFIDENCE))
+    wanted = deviance + float(scipy.special.chdtri(1, 1.0 - CONFIDENCE))
     best, found = likelihood.at(place), {}
     for i, name in enumerate(FITTED):
         value = float(getattr(best, name))
@@ -278,7 +280,7 @@ def _fitted(likelihood: _Likelihood, place: Floats, deviance: float, spread: Flo
 def _limit(likelihood: _Likelihood, index: int, place: Floats, wanted: float, sign: float) -> float:
     """Where the lowest deviance with this number held reaches `wanted`, on one side."""
     farthest = abs(float((_HIGHEST if sign > 0 else _LOWEST)[index] - place[index]))
-    forms = (math.exp, math.exp, lambda x: float(special.expit(x)))
+    forms = (math.exp, math.exp, lambda x: float(scipy.special.expit(x)))
 
     last = [place]
 
@@ -291,7 +293,7 @@ def _limit(likelihood: _Likelihood, index: int, place: Floats, wanted: float, si
         if outer >= farthest:
             return 0.0 if sign < 0 else (math.inf, math.inf, 1.0)[index]
         inner, outer = outer, min(farthest, outer * 2.0)
-    distance = float(optimize.brentq(excess, inner, outer, xtol=1e-6)) if farthest > 0.0 else 0.0
+    distance = float(scipy.optimize.brentq(excess, inner, outer, xtol=1e-6)) if farthest > 0.0 else 0.0
     return forms[index](float(place[index]) + sign * distance)
 
 
