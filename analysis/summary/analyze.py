@@ -11,8 +11,6 @@ from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_stu
 from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
-from analysis.paper.audit.page import predictions
-from analysis.paper.audit.run import audit, load_paper_file
 from analysis.paper.paper import Paper, Prediction, load_paper
 from analysis.report.section import Section
 from analysis.report.serial import as_json
@@ -257,7 +255,11 @@ def _told(one: _Analysed) -> ReportData:
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:
     """What the audit says of the published numbers."""
-    return {} if paper is None else predictions(audit(load_paper_file(paper)))
+    if paper is None:
+        return {}
+    from analysis.paper.audit import page, run  # noqa: PLC0415 - of no use without a paper
+
+    return page.predictions(run.audit(run.load_paper_file(paper)))
 
 
 def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
