@@ -19,8 +19,8 @@ pytestmark = pytest.mark.slow
 def brief(folder: Path) -> None:
     """Experiment 2 with trains of a few shots and no waiting."""
     config = folder / "preference.toml"
-    text, times = re.subn(r"^(opening|hand_over|answer)_s = [\d.]+", r"\1_s = 1.0", config.read_text(), flags=re.M)
-    text, trains = re.subn(r"^stimulus_s = [\d.]+", "stimulus_s = 4.0", text, flags=re.M)
+    text, times = re.subn(r"\n(opening|hand_over|answer)_s = [\d.]+", r"\n\1_s = 1.0", config.read_text())
+    text, trains = re.subn(r"\nstimulus_s = [\d.]+", "\nstimulus_s = 4.0", text)
     assert (times, trains) == (3, 1)
     config.write_text(text)
 
