@@ -67,8 +67,11 @@ for command in COMMANDS:
     app.command()(command)
 export_commands.command()(archives.bids)
 export_commands.command()(archives.archive)
+for commands in (app, export_commands, predictions.app):
+    for one in commands.registered_commands:  # a summary that is given is wrapped; left to the library, it is cut
+        one.short_help = ((one.callback and one.callback.__doc__) or "").partition("\n\n")[0]
 app.add_typer(export_commands, name="export")
-app.add_typer(predictions.app, name="fit")
+app.add_typer(predictions.app, name="fit", short_help="Fit a model: `percept` to a paper's rates, `times` to logs.")
 
 
 def main() -> None:

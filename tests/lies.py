@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import shutil
 import sys
 from collections.abc import Callable
@@ -209,6 +210,12 @@ def edit(old: str, new: str) -> Callable[[Path], object]:
         path.write_text(path.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8", newline="")
 
     return change
+
+
+def of_another_study(folder: Path) -> None:
+    """The table of another run, with the same code, beside this one's journal."""
+    path = table(folder, "direction")
+    path.write_bytes(re.sub(rb"\d{4}(?=-\d\d-\d\dT)", b"2019", path.read_bytes()))
 
 
 def renamed(folder: Path) -> None:
@@ -574,6 +581,11 @@ _JOURNALS: tuple[_Told, ...] = (
         "holds what the log of participant P01 in sub-P01/sub-P01_task-direction_trials.csv holds: all that was",
     ),
     ("a table edited after its run", in_folder(edit(",1,", ",2,")), "edited since the run; `recoil rebuild"),
+    (
+        "a table of another study, of the same code",
+        in_folder(of_another_study),
+        "is of another run of P01, as of another study: no onset is the same",
+    ),
     (
         "the journal's last line deleted, and the table edited",
         in_folder(unfinished_and_edited),

@@ -34,6 +34,17 @@ def test_every_command_has_help(recoil: Recoil, command: str) -> None:
     assert "Usage: recoil" in done.stdout
 
 
+@pytest.mark.parametrize("command", [(), ("export",), ("fit",)])
+def test_no_summary_of_a_command_is_cut_at_80_columns(recoil: Recoil, command: tuple[str, ...]) -> None:
+    listed = recoil(*command, "--help").stdout.partition("Commands:\n")[2]
+    assert "  " in listed
+    assert not [line for line in listed.splitlines() if line.endswith(("...", "…")) or len(line) > 80]
+
+
+def test_analyze_without_a_folder_for_its_results_says_what_to_give(recoil: Recoil) -> None:
+    refused(recoil("analyze", "results"), "give --out DIR", "recoil analyze results --out analysis")
+
+
 def test_wrong_usage_is_2(recoil: Recoil) -> None:
     refused(recoil("run", "direction"), "--participant")
     refused(recoil("unknown"), "unknown")

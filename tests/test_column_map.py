@@ -96,6 +96,14 @@ def test_one_bad_participant_of_a_long_table_leaves_the_others(tmp_path: Path) -
     assert "'left' is not allowed (rule: one of up, down, forward, backward" in problem.message
 
 
+def test_a_decimal_comma_that_the_map_does_not_know_names_its_key(tmp_path: Path) -> None:
+    rows = [[c.replace(".", ",") if i == 5 else c for i, c in enumerate(row)] for row in _psychopy(trial_rows())]
+    text = EXAMPLE.read_text(encoding="utf-8").replace('delimiter = ","', 'delimiter = ";"')
+    (problem,) = _read(_write(tmp_path / "P01.csv", rows, delimiter=";"), text).problems
+    assert problem.column == "key_resp.rt"
+    assert 'has a decimal comma (rule: text.decimal, a point); write decimal = "," under [text]' in problem.message
+
+
 def test_semicolons_decimal_commas_milliseconds_and_another_encoding(tmp_path: Path) -> None:
     rows = [
         [f"{1000 * float(c):.1f}".replace(".", ",") if i == 5 else c for i, c in enumerate(row)]

@@ -72,6 +72,10 @@ def test_p_is_corrected_over_the_contrasts_that_have_one():
         ((0, 0, 0, 0), "not all be 0"),
         ((1, -1), "4 numbers are needed, one a condition"),
         ((1, -1, math.nan, 0), "weights of 'x' must be finite"),
+        (
+            {"a": 1, "b": -1},
+            "weights of 'x' must be 4 numbers in the order of the conditions in `scores`, not a mapping",
+        ),
     ],
 )
 def test_what_is_no_contrast_is_refused_by_its_name(weights, said):

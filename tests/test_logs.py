@@ -221,3 +221,29 @@ def test_the_logs_of_an_excluded_participant_are_left_out_with_the_reason(tmp_pa
     logs = read_logs([tmp_path])
     assert set(logs.trials["participant_id"]) == {"P01"}
     assert "participant P02 is excluded: fell ill" in str(logs.problems[0])
+
+
+def _onset(row: dict[str, str], second: int) -> dict[str, str]:
+    return row | {"onset_utc": f"2024-11-21T09:{second // 60:02d}:{second % 60:02d}.123456Z"}
+
+
+@pytest.mark.parametrize("first", ["lab", "copy"])
+def test_of_two_folders_with_the_same_logs_the_one_that_was_named_first_stays(first: str, tmp_path: Path) -> None:
+    rows = [_onset(row, second) for second, row in enumerate(trial_rows())]
+    other = "copy" if first == "lab" else "lab"
+    for name in (first, other):
+        write_rows(trials_path(tmp_path / name, "P01"), rows)
+    logs = read_logs([tmp_path / first, tmp_path / other])
+    assert logs.files == (trials_path(tmp_path / first, "P01"),)
+    (problem,) = logs.problems
+    assert problem.file == trials_path(tmp_path / other, "P01")
+    assert f"holds what {first}/sub-P01/sub-P01_task-direction_trials.csv holds, byte for byte" in problem.message
+
+
+@pytest.mark.parametrize("first", ["lab", "copy"])
+def test_of_two_logs_with_the_same_answers_the_one_that_was_named_first_stays(first: str, tmp_path: Path) -> None:
+    other = "copy" if first == "lab" else "lab"
+    for name, code in ((first, "P02"), (other, "P01")):
+        write_rows(trials_path(tmp_path / name, code), trial_rows(code))
+    logs = read_logs([tmp_path / first, tmp_path / other])
+    assert logs.files == (trials_path(tmp_path / first, "P02"),)

@@ -19,7 +19,7 @@ from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.sections import write_report
 from analysis.summary.summary import summarize
 from tests import figure_files
-from tests.log_files import trial_rows, trials_path, write_rows, write_study
+from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.made_scores import crowd_of
 from tests.shown_panels import shot_panel
 
@@ -193,6 +193,17 @@ def test_one_participant_gets_means_and_no_tests(tmp_path: Path) -> None:
     assert "There were too few participants or methods for a test." in text
     assert "> **ONE PARTICIPANT in direction recognition and preference: " in text
     assert "(SD)" not in text.split("## Results")[1].split("## Direction")[0]
+
+
+def test_where_all_scores_are_equal_the_page_says_in_words_that_nothing_differs(tmp_path: Path) -> None:
+    for i in range(1, 4):
+        rows = [row | {"rating": "5.0"} for row in rating_rows(f"P{i:02d}", i)]
+        write_rows(ratings_path(tmp_path, f"P{i:02d}"), rows)
+    write_report(tmp_path / "out", ReportData(title="Equal", statistics=summarize(read_logs([tmp_path]))))
+    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "Nothing differs: all scores are equal" in text
+    assert "no pair of methods differs at all" in text
+    assert "p undefined" not in text
 
 
 def test_files_are_named_below_their_common_folder_not_by_the_machine(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from analysis.logs.exclusions import LeftOut
 from analysis.logs.reading import read_logs
 from analysis.paper.paper import ComparisonRow
 from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.experiments import effect_sentence
 from analysis.summary.sections.manuscript import manuscript_section
 from analysis.summary.sections.participants import left_out_lines, notices
 from analysis.summary.sections.sections import sections
@@ -111,6 +112,12 @@ def test_the_words_for_a_paper_have_n_exclusions_effect_sizes_exact_p_and_softwa
     ):
         assert words in told
     assert "p < .001" not in told
+
+
+def test_an_F_of_two_people_is_not_printed_without_a_caution(tmp_path: Path) -> None:
+    found = report_of(write_study(tmp_path, participants=2)).statistics.preference
+    assert found is not None
+    assert "partial η² = .73. Two people are too few to say anything of others" in effect_sentence(found, "preference")
 
 
 def test_who_was_left_out_stands_under_one_rule_with_the_remedy(tmp_path: Path) -> None:

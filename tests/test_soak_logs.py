@@ -140,12 +140,15 @@ def test_the_whole_command_with_broken_files(logs: Path, tmp_path: Path, soak: S
         for path, data in zip(broken, kept, strict=True):
             path.write_bytes(data)
     loop = _loop_s(logs)
-    named = sum("'left' is not allowed" in line for line in done.stderr.splitlines())
-    n = json.loads((tmp_path / "statistics.json").read_text(encoding="utf-8"))["direction"]["n"]
-    soak("broken logs named with line and reason", f"{named} of {len(broken)}", "all", f"{n} others analysed")
+    found = json.loads((tmp_path / "statistics.json").read_text(encoding="utf-8"))
+    named, n = sum("'left' is not allowed" in str(one) for one in found["excluded"]), found["direction"]["n"]
+    report = (tmp_path / "report.md").read_text(encoding="utf-8").count("'left' is not allowed")
+    how = f"in `statistics.json`, and in the report {report}; {n} others analysed"
+    soak("broken logs named with line and reason", f"{named} of {len(broken)}", "all", how)
     how = f"{elapsed:.1f} s, one run; the loop {loop:.1f} s, right after it"
     soak("`recoil analyze` of these, with report and figures", f"{elapsed / loop:.1f} loops", "4", how)
     assert (done.returncode, named, n) == (1, len(broken), LOGS - len(broken))
+    assert report >= len(broken)
     assert elapsed < 4 * loop
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +11,7 @@ from analysis.logs.column_map import MappedLog
 from analysis.logs.doubles import ToldRows, doubles_among, told_by_block
 from analysis.logs.doubtful_times import doubts_of_block
 from analysis.logs.files import (
+    FULL_ONSET,
     BadLogError,
     Problem,
     code_in_name,
@@ -28,8 +28,6 @@ from experiments.record.tables import DataKind
 from experiments.study import register
 from experiments.study.study import Member
 
-_ONSET = re.compile(rb"T\d\d:\d\d:\d\d\.\d{6}Z")
-"""An onset to the µs: no two runs have all the same."""
 LOGS_A_FILE = 1 << 20
 """Numbers of logs are so far apart from file to file: a mapped file may hold several."""
 
@@ -94,8 +92,12 @@ class LogsSoFar:
     """The files of good logs, numbered."""
     mapped: set[int] = field(default_factory=set)
     """The numbers of the logs that other programs wrote."""
+    given: Mapping[str, int]
+    """For each path its place among those that were given: of copies, the one that was named first stays."""
     contents: dict[int, str] = field(default_factory=dict)
     """The file that first held each content."""
+    same: dict[str, set[str]] = field(default_factory=dict)
+    """The files that hold what the first does, with the first."""
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
     """Who stands in the register of each results folder."""
     remarks: list[Problem] = field(default_factory=list)
@@ -150,7 +152,7 @@ class LogsSoFar:
             said = f"participant {log.code} is excluded: {reason} ({how} readmits them)"
             raise BadLogError(f"{said} (rule: {IN_REGISTER})")
         self._check_new(study, log, number)
-        self._check_no_copy(one)
+        self._note_copy(one)
         self.studies[number], self.codes[number], self.experiments[number] = study, log.code, log.experiment
         self.paths[number // LOGS_A_FILE] = one.path
 
@@ -175,22 +177,38 @@ class LogsSoFar:
             raise BadLogError(message, None, "participant_id")
         earlier.append(number)
 
-    def _check_no_copy(self, one: WaitingFile) -> None:
-        """`BadLogError`: the same table, with onsets to the µs, stood elsewhere, as in a copy of the folder."""
-        if not isinstance(one.content, bytes) or not _ONSET.search(one.content):
-            return
-        same = self.contents.setdefault(hash(one.content), one.path)
-        if same != one.path:
-            where = seen_from(same, one.path)
-            raise BadLogError(f"holds what {where} holds, byte for byte (rule: a run counts once); read one of both")
+    def _note_copy(self, one: WaitingFile) -> None:
+        """The same table, with onsets to the µs, may stand elsewhere, as in a copy of the folder."""
+        if isinstance(one.content, bytes) and FULL_ONSET.search(one.content):
+            first = self.contents.setdefault(hash(one.content), one.path)
+            if first != one.path:
+                self.same.setdefault(first, {first}).add(one.path)
 
     def leave_copies(self) -> None:
         """Leave out the logs that hold what others hold."""
+        self._leave_same()
         proven = {number for number, (_, _, has_journal) in self.proven.items() if has_journal}
+
+        def rank(number: int) -> tuple[bool, int]:
+            return number not in proven, self.given.get(self.paths[number // LOGS_A_FILE], 0)
+
         for experiment, told in self.told.items():
             mine = [number for number in self.studies if self.experiments[number] == experiment]
-            for number, said in copies(doubles_among(told, mine), proven, self._seen_from):
+            for number, said in copies(doubles_among(told, mine), proven, rank, self._seen_from):
                 self._leave(number, said)
+
+    def _leave_same(self) -> None:
+        """Of files that are alike byte for byte the one that was named first stays."""
+        stays = dict[str, str]()
+        for paths in self.same.values():
+            first, *others = sorted(paths, key=lambda path: (self.given.get(path, 0), path))
+            stays |= dict.fromkeys(others, first)
+        for number in [*self.studies] if stays else ():
+            path = self.paths[number // LOGS_A_FILE]
+            if path in stays:
+                said = f"holds what {seen_from(stays[path], path)} holds, byte for byte (rule: a run counts once)"
+                self._leave(number, f"{said}; read one of both")
+                self.proven.pop(number, None)
 
     def _seen_from(self, number: int, other: int) -> str:
         """What the person of a log is called in what is said of another."""

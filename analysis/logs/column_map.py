@@ -386,7 +386,7 @@ def _instruction(line: _Line, mapping: ColumnMap) -> str:
 
 
 def _rating(line: _Line, mapping: ColumnMap) -> _Row:
-    cell = line.cells[str(mapping.columns.rating)].replace(mapping.text.decimal, ".")
+    cell = _decimal(line, str(mapping.columns.rating), mapping)
     if mapping.rating is not None and (value := _number_in(cell)) is not None:
         scale = mapping.rating
         if not scale.scale_min <= value <= scale.scale_max:
@@ -412,9 +412,18 @@ def _translated(line: _Line, name: str, mapping: ColumnMap) -> str:
 def _seconds(line: _Line, mapping: ColumnMap) -> str:
     if mapping.columns.response_time is None or mapping.response_time is None:
         return tables.MISSING
-    cell = line.cells[mapping.columns.response_time].replace(mapping.text.decimal, ".")
+    cell = _decimal(line, mapping.columns.response_time, mapping)
     value = _number_in(cell)
     return repr(value / 1000.0) if value is not None and mapping.response_time.unit == "ms" else cell
+
+
+def _decimal(line: _Line, column: str, mapping: ColumnMap) -> str:
+    """A cell's number with a decimal point. `BadLogError`: it has a comma, and the map does not say so."""
+    cell = line.cells[column]
+    if "," in cell and mapping.text.decimal == "." and _number_in(cell.replace(",", ".")) is not None:
+        how = 'write decimal = "," under [text] in the map'
+        raise BadLogError(f"{cell!r} has a decimal comma (rule: text.decimal, a point); {how}", line.number, column)
+    return cell.replace(mapping.text.decimal, ".")
 
 
 def _number_in(cell: str) -> float | None:

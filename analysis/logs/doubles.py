@@ -239,7 +239,7 @@ def _written_often(every: _Together) -> Iterator[Double]:
 def _begins_again(every: _Together) -> BoolArray:
     """The logs whose first row is their second too, or begins a later part; all that are written often are of these."""
     rows, first = every.told.rows, every.row[every.begins]
-    found = first == every.row[every.begins + (rows > 1)]
+    found: BoolArray = first == every.row[every.begins + (rows > 1)]
     for often in _OFTEN:
         found |= first == every.row[every.begins + rows // often]
     return found
@@ -291,8 +291,8 @@ def _same_windows(every: _Together) -> NDArray[np.intp]:
     again = _several_times(hashes)
     starts, hashes = starts[again], hashes[again]
     _, first, of = np.unique(hashes, return_index=True, return_inverse=True)
-    pairs = np.stack([starts[first[of]], starts], axis=1)
-    return pairs[pairs[:, 0] != pairs[:, 1]]
+    later = starts[first[of]] != starts
+    return np.stack([starts[first[of]][later], starts[later]], axis=1)
 
 
 def _windows(every: _Together) -> tuple[NDArray[np.intp], _Hashes]:

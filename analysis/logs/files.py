@@ -14,6 +14,8 @@ from experiments.record import tables
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in tables.FILE_SUFFIX.values())
 _CODE = re.compile(r"sub-([^_]+)_")
 _TASK = re.compile(r"_task-([a-z]+)_[^/\\]*$")
+FULL_ONSET = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z")
+"""An onset to the µs: no two runs have all the same."""
 _READ_ONLY = os.O_RDONLY | getattr(os, "O_BINARY", 0)
 _PIECE_BYTES = 1 << 16
 
@@ -73,6 +75,8 @@ class FoundFiles:
     logs: Mapping[str, str]
     journals: Mapping[str, str]
     problems: tuple[Problem, ...]
+    given: Mapping[str, int]
+    """For each the place, among the paths that were given, of the first that holds it."""
 
 
 def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> FoundFiles:
@@ -82,6 +86,8 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Foun
     `paths`.
     """
     found: dict[str, tuple[str, str]] = {}
+    given: dict[str, int] = {}
+    places = {path: place for place, path in reversed([*enumerate(paths)])}
     problems: list[Problem] = []
     for path in sorted(set(paths), key=lambda path: (_real(path), str(path))):
         logs = _in_folder(path, (*endings, _JOURNALS), problems) if path.is_dir() else {_real(path): str(path)}
@@ -93,11 +99,12 @@ def find_logs(paths: Sequence[Path], endings: tuple[str, ...] = ENDINGS) -> Foun
             continue
         top = _real(path if path.is_dir() else path.parent)
         for real, log in logs.items():
-            found.setdefault(real, (log, _study(real, top)))
+            there, _ = found.setdefault(real, (log, _study(real, top)))
+            given[there] = min(places[path], given.get(there, len(paths)))
     in_order = [found[real] for real in sorted(found, key=_by_parts)]
     journals = {log: study for log, study in in_order if _is_journal(log)}
     logs_found = {log: study for log, study in in_order if log not in journals and _is_counted(log)}
-    return FoundFiles(logs=logs_found, journals=journals, problems=tuple(problems))
+    return FoundFiles(logs=logs_found, journals=journals, problems=tuple(problems), given=given)
 
 
 _JOURNALS = ".jsonl"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from analysis.logs.files import BadLogError, Problem
+from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from experiments.rebuild import JOURNAL_NAME, misnamed, table
 from experiments.record import journal, replay
 from experiments.record.journal import Contents, JournalError
@@ -125,17 +125,31 @@ def compared_with(data: bytes, path: str, content: bytes) -> str:
         return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"
     of_table, of_itself = journal.ending_of(data)
     if of_table and of_table != hashlib.sha256(content).hexdigest():
-        raise _edited(where, data, f"edited since the run; `recoil rebuild {where}` gives the original")
+        raise _edited(where, data, content, f"edited since the run; `recoil rebuild {where}` gives the original")
     return "" if of_itself else _compared_whole(where, content, data, finished=bool(of_table))
 
 
-def _edited(where: str, data: bytes, otherwise: str) -> BadLogError:
+def _edited(where: str, data: bytes, content: bytes, otherwise: str) -> BadLogError:
     """What is said of a table that its journal does not make: whose the journal is, if it is another run's."""
+    name = Path(where).name
     with suppress(JournalError):  # what is wrong with the head is no news beside a table that differs
         head = journal.head_of(Path(where), data)
         if head is not None and (said := misnamed(Path(where), head.plan)):
-            return BadLogError(f"the journal beside it, {Path(where).name}, {said}; nothing proves this table")
+            return BadLogError(f"the journal beside it, {name}, {said}; nothing proves this table")
+        contents = journal.contents_of(Path(where), data)
+        if contents is not None and _of_another_run(table(contents), content):
+            other = f"is of another run of {contents.plan.participant_id}, as of another study: no onset is the same"
+            return BadLogError(
+                f"the journal beside it, {name}, {other} (rule: a run's table and journal stay together); put the "
+                "journal of this table here and that one back to its own"
+            )
     return BadLogError(otherwise)
+
+
+def _of_another_run(made: bytes, content: bytes) -> bool:
+    """Whether two tables have onsets and share none; an edited one keeps those of its run."""
+    ours, theirs = ({*FULL_ONSET.findall(some)} for some in (made, content))
+    return bool(ours and theirs) and ours.isdisjoint(theirs)
 
 
 def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) -> str:
@@ -150,7 +164,7 @@ def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) 
         return f"its journal cannot be trusted, {known}: {_without(where, error)}"
     if made != content:
         how = f"edited, or the run went on since; `recoil rebuild {where}` makes it anew"
-        raise _edited(where, data, f"is not what its journal says: {how}")
+        raise _edited(where, data, content, f"is not what its journal says: {how}")
     if finished:
         return "its journal was changed and says the same as before"
     return "its run is not finished; the table holds what was answered so far, and `recoil run ... --resume` goes on"

@@ -122,7 +122,7 @@ def read_logs(
     """
     endings = mapping.files_end_with if mapping else ()
     files = find_logs([Path(path) for path in paths], (*ENDINGS, *endings))
-    reading = LogsSoFar(problems=list(files.problems))
+    reading = LogsSoFar(problems=list(files.problems), given=files.given)
     runs = [run for path, study in files.journals.items() if (run := run_file(path, study))]
     made, begun = _without_tables(reading, without_table(runs, files.logs))
     every = {**files.logs, **{run.path: run.study for run in runs if run.path in made}}

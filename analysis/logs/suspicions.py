@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +17,25 @@ PersonCalled = Callable[[int, int], str]
 """What the person of a log is called in what is said of another log, by both numbers."""
 
 
-def copies(doubles: Iterable[Double], proven: Collection[int], named: PersonCalled) -> Iterator[tuple[int, str]]:
+def copies(
+    doubles: Sequence[Double], proven: Collection[int], rank: Callable[[int], tuple[bool, int]], named: PersonCalled
+) -> Iterator[tuple[int, str]]:
     """The logs to leave out, each with what is said of it.
 
-    Of two that are alike from end to end one stays: the one that a journal proves, else the first. Where a part was
-    copied, nobody knows into which of both, so that both go, but for what a journal proves; what repeats itself goes.
+    Of those that are alike from end to end one stays: the first by `rank`. Where a part was copied, nobody knows into
+    which of both, so that both go, but for what a journal proves; what repeats itself goes.
     """
+    stay: dict[int, int] = {}
+    for double in doubles:
+        if double.whole:
+            stay[double.first] = min(stay.get(double.first, double.first), double.second, key=rank)
     for double in doubles:
         first, second = double.first, double.second
         if first == second:
             yield first, _said_of_itself(double)
         elif double.whole:
-            swap = second in proven and first not in proven
-            stays, goes = (second, first) if swap else (first, second)
+            stays = stay[first]
+            goes = first if second == stays else second
             yield goes, f"holds what the log of participant {named(stays, goes)} holds: {_same(double)}"
         else:
             both = (first, second, double.at), (second, first, double.at[::-1])

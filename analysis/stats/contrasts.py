@@ -72,6 +72,9 @@ def planned_contrasts(
 
 
 def _checked(name: str, weights: Sequence[float], k: int) -> FloatArray:
+    if isinstance(weights, Mapping):
+        order = "in the order of the conditions in `scores`"
+        raise ValueError(f"weights of {name!r} must be {k} numbers {order}, not a mapping: {in_brief(weights)}")
     array = numbers(weights, f"weights of {name!r}")
     if array.shape != (k,):
         raise ValueError(f"weights of {name!r}: {k} numbers are needed, one a condition, not {in_brief(weights)}")

@@ -21,7 +21,7 @@ from analysis.report.terminal import (
     show,
     tracked,
 )
-from device.words import few_of_each
+from device.words import RecoilError, few_of_each
 
 
 class ObserverName(StrEnum):
@@ -56,7 +56,9 @@ def reproduce(
 
 def analyze(
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Logs, or folders with logs.")],
-    out: Annotated[Path, typer.Option(help="Folder for statistics, figures and report.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for statistics, figures and report; required.", show_default=False)
+    ] = None,
     columns: ColumnsOption = None,
     rules: RulesOption = None,
     paper: Annotated[Path | None, typer.Option(help="Published numbers to compare with.")] = None,
@@ -69,6 +71,11 @@ def analyze(
     """Statistics, tables, figures and report of any number of logs."""
     from analysis.summary import analyze as feature
 
+    if out is None:
+        raise RecoilError(
+            "analyze: give --out DIR, the folder for statistics, figures and report, as in "
+            "`recoil analyze results --out analysis`"
+        )
     asked = feature.Request(
         paths=paths,
         out=out,

@@ -16,6 +16,12 @@ from experiments.study.study import Member
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 
+TWO_PEOPLE = (
+    "Two people are too few to say anything of others: the error is what these two differ by, and no assumption of the "
+    "test can be checked."
+)
+"""Said behind an F of two."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportData:

@@ -11,7 +11,7 @@ from analysis.report.labels import display_name, named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary
-from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.content import TWO_PEOPLE, ReportData
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from experiments.design.language import Level
@@ -67,13 +67,9 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
     people = f"{found.n:,} {'synthetic ' if found.origin.synthetic else ''}participant{'' if found.n == 1 else 's'}"
     for asked, question in found.questions.items():
         if question.cells:
-            told = " ".join(
-                [
-                    _cells_words(found, question),
-                    *_tests_words(question, exact=exact),
-                    *threshold_sentences(found, question),
-                ]
-            )
+            tests = [*_tests_words(question, exact=exact)]
+            few = [TWO_PEOPLE] if found.n == 2 and tests else []
+            told = " ".join([_cells_words(found, question), *tests, *few, *threshold_sentences(found, question)])
             yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 

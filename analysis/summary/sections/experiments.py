@@ -13,7 +13,7 @@ from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
 from analysis.stats.paired import PairedT
 from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
-from analysis.summary.sections.content import ReportData, has_many
+from analysis.summary.sections.content import TWO_PEOPLE, ReportData, has_many
 from analysis.summary.sections.pictures import directions_picture
 
 
@@ -67,10 +67,11 @@ def effect_sentence(found: WithinStatistics, experiment: str, *, full: bool = Fa
     if anova is None:
         return f"{means} There were too few participants or methods for a test."
     if math.isnan(anova.p):
-        return f"{means} The {anova.name} is undefined: all scores are equal."
+        return f"{means} Nothing differs: all scores are equal, so the {anova.name} has neither F nor p."
     effect = "had a significant effect" if anova.p < 0.05 else "had no significant effect"
     test = f"{apa.f_test(anova.F, anova.df, anova.p, exact=full)}{_sizes(found, full=full)}"
-    return f"The rendering method {effect} on {printed.words}, {test}. {means}"
+    few = f" {TWO_PEOPLE}" if found.n == 2 else ""
+    return f"The rendering method {effect} on {printed.words}, {test}.{few} {means}"
 
 
 def _means_words(found: WithinStatistics, printed: PrintedMeasure) -> str:
@@ -106,6 +107,8 @@ def pairs_sentence(found: WithinStatistics, experiment: str, *, full: bool = Fal
         differing = sum(pair.p < SIGNIFICANT for pair in found.tukey)
         told = f"{differing or 'none'} of {len(found.tukey)} pairs differed significantly; the table has all"
         return f"{comparisons(planned=planned)} (Tukey's HSD): {told}."
+    if all(math.isnan(pair.p) for pair in found.tukey):
+        return f"{comparisons(planned=planned)}: no pair of methods differs at all."
     tests = zip(found.tukey, found.supplement.paired_t, strict=True)
     pairs = "; ".join(_pair_words(pair, _tested(pair, t, experiment, full=full)) for pair, t in tests)
     note = ", 95 % CIs simultaneous" if full else ""
@@ -120,6 +123,8 @@ def comparisons(*, planned: bool) -> str:
 def _pair_words(pair: Pair, tested: str) -> str:
     """The larger mean first."""
     a, b = display_name(pair.a), display_name(pair.b)
+    if math.isnan(pair.p):
+        return f"{a} and {b} do not differ at all"
     if not pair.p < 0.05:
         return f"{a} and {b} did not differ significantly, {tested}"
     return f"{b} was above {a}, {tested}" if pair.difference < 0.0 else f"{a} was above {b}, {tested}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from analysis.paper.recurrence import SIGNIFICANT
@@ -122,8 +123,12 @@ def _tests_words(found: WithinStatistics, experiment: str) -> str:
     if has_many(found):
         differing = sum(pair.p < SIGNIFICANT for pair in found.tukey or ())
         return f"Tukey's tests, {EXPERIMENTS[experiment]}: {differing} of {len(found.tukey or ())} pairs differ."
-    pairs = "; ".join(f"{display_name(c.a)} against {display_name(c.b)} {apa.p_value(c.p)}" for c in found.tukey or ())
+    pairs = "; ".join(f"{display_name(c.a)} against {display_name(c.b)} {_p_words(c.p)}" for c in found.tukey or ())
     return f"Tukey's tests, {EXPERIMENTS[experiment]}: {pairs}." if pairs else ""
+
+
+def _p_words(p: float) -> str:
+    return "no difference at all" if math.isnan(p) else apa.p_value(p)
 
 
 def directions_picture(found: DirectionStatistics) -> Picture:
