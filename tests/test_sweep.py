@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.predict.simulate import run as shots
-from analysis.predict.simulate.scene import ModelRequest
+from analysis.predict.simulate import sweep as shots
+from analysis.predict.simulate.request import ModelRequest, SimulateRequest
 from device.physics import GunParameters, simulate
 from experiments.config.door import ConfigError
 from tests.waiting import PATIENCE_S, wait_for
@@ -32,7 +32,7 @@ def swept(table, *vary, fidelity="full", **others):
     usual = {"gun": "gun", "method": None, "changes": (), "trace": None, "plot": None, "audit": False, "hand": None}
     usual |= {"contact_stiffness_N_m": None, "vary": vary, "table": table, "yes": False}
     model = ModelRequest(fidelity=fidelity, scene=None, needs=())
-    return shots.sweep(shots.SimulateRequest(**usual | {"model": model} | others), GUN, silent, lambda _note: None)
+    return shots.sweep(SimulateRequest(**usual | {"model": model} | others), GUN, silent, lambda _note: None)
 
 
 def rows_of(path):
@@ -93,6 +93,7 @@ def test_a_table_says_where_it_comes_from(tmp_path):
 
 def test_blocks_make_the_table_of_one_piece(tmp_path, monkeypatch):
     words = ("friction_N=0.1:1.2:7", "voltage_V=12:24:5")
+    monkeypatch.setattr(shots, "FEW_SHOTS", 0)
     swept(tmp_path / "whole.csv", *words)
     monkeypatch.setattr(shots, "_BLOCK", 4)
     monkeypatch.setattr(shots, "_GROUP", 10)
@@ -105,13 +106,24 @@ def test_blocks_make_the_table_of_one_piece(tmp_path, monkeypatch):
 def test_without_the_compiler_the_numbers_are_the_same_and_it_is_said(tmp_path, monkeypatch):
     from device.physics import batch
 
+    monkeypatch.setattr(shots, "FEW_SHOTS", 0)
     swept(tmp_path / "fast.parquet", "friction_N=0.1:1.2:5")
     for module in (shots, batch):
         monkeypatch.setattr(module, "find_spec", lambda _name: None)
     swept(tmp_path / "slow.parquet", "friction_N=0.1:1.2:5")
     fast, slow = (pq.read_table(tmp_path / f"{name}.parquet").to_pydict() for name in ("fast", "slow"))
     assert slow["impact_speed_m_s"] == pytest.approx(fast["impact_speed_m_s"], rel=1e-12)
-    assert "recoil[fast]" in shots.interpreted_note()
+    assert "recoil[fast]" in shots.waiting_note()
+
+
+def test_few_shots_wait_for_no_compiler(tmp_path, monkeypatch):
+    from device.physics import batch
+
+    monkeypatch.setattr(batch, "machine_code", lambda: 1 / 0)
+    monkeypatch.setattr(shots, "FEW_SHOTS", 6)
+    swept(tmp_path / "few.csv", "friction_N=0.1:1.2:6")
+    with pytest.raises(ZeroDivisionError):
+        swept(tmp_path / "many.csv", "friction_N=0.1:1.2:7")
 
 
 @pytest.mark.parametrize(

@@ -158,13 +158,14 @@ def simulate_batch(
     fidelity: str = "full",
     cores: int | None = None,
     progress: Callable[[int], object] | None = None,
+    interpreted: bool = False,
     **arrays: ArrayLike,
 ) -> ShotBatch:
     """The shots of `gun` with the parameters in `arrays` in place of its own, broadcast against each other.
 
-    Compiled where numba is installed, else interpreted. `progress` is called after every few thousand shots with
-    their number. `ValueError`: no such parameter or fidelity. Numbers that physics has not make their shot `invalid`
-    and no other one.
+    Compiled where numba is installed, unless `interpreted` is asked for, which ends sooner for a few hundred shots.
+    `progress` is called after every few thousand shots with their number. `ValueError`: no such parameter or fidelity.
+    Numbers that physics has not make their shot `invalid` and no other one.
 
     >>> simulate_batch(friction_N=[0.21, -1.0, 1.70]).names().tolist()
     ['home', 'invalid', 'stuck']
@@ -172,7 +173,8 @@ def simulate_batch(
     guns, valid = _guns(gun or GunParameters(), fidelity, arrays)
     results = np.zeros(len(guns), _RESULT)
     among = results if valid.all() else np.empty(int(valid.sum()), _RESULT)
-    _run(guns if valid.all() else guns[valid], among, cores, progress or (lambda _count: None))
+    run = _interpret_each if interpreted or find_spec("numba") is None else machine_code()
+    _run(run, guns if valid.all() else guns[valid], among, cores, progress or (lambda _count: None))
     if among is not results:
         results[valid] = among
     numbers = {name: np.where(valid, results[name], np.nan) for name in ShotBatch.__slots__[1:]}
@@ -230,9 +232,13 @@ def _reduce(guns: Records, model: int) -> None:
         guns["back_emf"], guns["opens"] = 0.0, True
 
 
-def _run(guns: Records, results: Records, cores: int | None, progress: Callable[[int], object]) -> None:
-    run = machine_code() if find_spec("numba") else _interpret_each
-
+def _run(
+    run: Callable[[Records, Records], None],
+    guns: Records,
+    results: Records,
+    cores: int | None,
+    progress: Callable[[int], object],
+) -> None:
     def one(start: int) -> int:
         chunk = slice(start, start + _CHUNK)
         run(guns[chunk], results[chunk])

@@ -29,7 +29,7 @@ from analysis.paper.paper import (
 )
 from analysis.paper.recurrence import PatternOdds
 from analysis.predict.drawn import DirectionStudies, Drawn, RatingStudies, rates_by_method, studies_of
-from analysis.predict.simulate.shot import shot_panel
+from analysis.predict.simulate.panels import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds, rates_of
 from analysis.report.serial import as_csv
 from analysis.report.terminal import Tell

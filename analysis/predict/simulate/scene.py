@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 from numpy.typing import ArrayLike
 
+from analysis.predict.simulate.request import ModelRequest
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL
 from device.parameters import GunParameters
@@ -15,20 +16,6 @@ from device.physics.scenes import COLLISION, NEEDED, SCENES, ModelChoice, Scene,
 from experiments.config.door import ConfigError
 
 _OWN = "needs of your own"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ModelRequest:
-    """Which model is wanted: by its name, by a scene's, or by needs, OUTPUT=ERROR each."""
-
-    fidelity: str | None
-    scene: str | None
-    needs: Sequence[str]
-
-    @property
-    def is_of_scene(self) -> bool:
-        """Is the model to be picked for a use of it?"""
-        return self.scene is not None or bool(self.needs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

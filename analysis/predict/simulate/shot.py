@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from analysis.predict.simulate.scene import ScenePick, scene_section
-from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_csv
 from device.parameters import GunParameters
@@ -36,10 +34,7 @@ _BALANCE_WORDS = {
     "residual_impulse_Ns": "net over the cycle, less the momentum left",
 }
 _AFTER_S = 0.4  # looked at after the pulse: a shot's way home and the hand's rest
-_COARSE_S = 0.0005  # steps above which a curve is drawn with corners
-_MOST_POINTS = 40_000
-_TITLE_WIDTH = 44
-_VIBRATION_POINTS = 2401
+VIBRATION_POINTS = 2401
 _FINE = 200_001  # samples, of which the largest is the peak to nine digits
 
 
@@ -97,33 +92,6 @@ class SimulatedVibration:
 
     parameters: VibrationParameters
     summary: VibrationSummary
-
-
-def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
-    """The panel of one shot by the model."""
-    shot = trace(parameters)
-    if shot.time_s[-1] - shot.time_s[-2] > _COARSE_S:
-        shot = trace(parameters, min(int(2 * shot.time_s[-1] / _COARSE_S), _MOST_POINTS))
-    return ShotPanel(
-        title=title,
-        time_s=shot.time_s,
-        force_N=shot.force_N,
-        displacement_m=shot.displacement_m,
-        velocity_m_s=shot.velocity_m_s,
-        drive_V=shot.drive_V,
-        stage_ends_s=_ends(shot.summary),
-        collision_force_N=_or_nan(shot.summary.collision_force_N),
-        contact_depth_m=parameters.contact_depth_m,
-        status=shot.summary.status,
-    )
-
-
-def _ends(summary: ShotSummary) -> tuple[float, float, float]:
-    return _or_nan(summary.recoil_end_s), _or_nan(summary.firing_end_s), _or_nan(summary.reset_end_s)
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 PARAMETER_KINDS: dict[str, type[float] | type[str]] = {
@@ -234,19 +202,6 @@ def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
     storage.write_whole(path, as_csv(columns, zip(*columns.values(), strict=True)))
 
 
-def write_plot(parameters: GunParameters, path: Path) -> None:
-    """Figure 5's panels of the shot, as PNG and SVG beside each other."""
-    title = "\n".join(textwrap.wrap(_title(parameters), _TITLE_WIDTH))
-    figure_5([shot_panel(title, parameters)], path.with_suffix(""))
-
-
-def _title(parameters: GunParameters) -> str:
-    """The friction, and every number that is not the paper's."""
-    own = (field.name for field in fields(parameters) if getattr(parameters, field.name) != field.default)
-    others = [f"{name} = {_shown(getattr(parameters, name))}" for name in own if name != "friction_N"]
-    return ", ".join([f"friction {parameters.friction_N:g} N", *others])
-
-
 def sections(found: SimulatedShot) -> tuple[Section, ...]:
     """The shot in words: one number a line, units in the names; the pick before it, what else was asked for after."""
     p = found.parameters
@@ -265,7 +220,7 @@ def sections(found: SimulatedShot) -> tuple[Section, ...]:
 def _more(found: SimulatedShot) -> Iterator[Section]:
     if found.audit is not None:
         rows = (
-            f"{name:24} {_shown(value):12} {_BALANCE_WORDS.get(name, '')}".rstrip()
+            f"{name:24} {in_words(value):12} {_BALANCE_WORDS.get(name, '')}".rstrip()
             for name, value in asdict(found.audit).items()
         )
         yield Section(title="Energy and momentum, full model, until the magnet rests", items=tuple(rows))
@@ -282,27 +237,23 @@ def _more(found: SimulatedShot) -> Iterator[Section]:
 
 def _rows(numbers: Any) -> tuple[str, ...]:
     """A line for each field."""
-    return tuple(f"{one.name:24} {_shown(getattr(numbers, one.name))}" for one in fields(numbers))
+    return tuple(f"{one.name:24} {in_words(getattr(numbers, one.name))}" for one in fields(numbers))
 
 
-def _shown(value: object) -> str:
+def in_words(value: object) -> str:
     """A value for a person: six digits, and words for what was not reached."""
     return "not reached" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def simulated_vibration(
-    parameters: VibrationParameters, trace_file: Path | None, plot: Path | None
-) -> SimulatedVibration:
-    """What the vibration comes to; its trace and figure are written. `ConfigError`: there is no such one."""
+def simulated_vibration(parameters: VibrationParameters, trace_file: Path | None) -> SimulatedVibration:
+    """What the vibration comes to; its trace is written. `ConfigError`: there is no such one."""
     try:
         vibration = solved(parameters)
     except ValueError as error:
         raise ConfigError(f"vibration: {error}") from error
     if trace_file:
-        time_s, acceleration = waveform(parameters, _VIBRATION_POINTS)
+        time_s, acceleration = waveform(parameters, VIBRATION_POINTS)
         _write_columns(trace_file, {"time_s": time_s.tolist(), "acceleration_m_s2": acceleration.tolist()})
-    if plot:
-        figure_vibration(_vibration_panel(parameters, vibration), plot.with_suffix(""))
     return SimulatedVibration(parameters=parameters, summary=_vibration_summary(parameters, vibration))
 
 
@@ -322,17 +273,4 @@ def _vibration_summary(parameters: VibrationParameters, vibration: Vibration) ->
         frequency_Hz=parameters.frequency_Hz,
         slow_decay_1_s=slow,
         fast_decay_1_s=fast,
-    )
-
-
-def _vibration_panel(parameters: VibrationParameters, vibration: Vibration) -> VibrationPanel:
-    time_s = np.linspace(0.0, 1.25 * parameters.duration_s, _VIBRATION_POINTS)
-    return VibrationPanel(
-        title=f"Vibration, effect {parameters.effect} at {parameters.frequency_Hz:g} Hz",
-        time_s=time_s,
-        acceleration_m_s2=vibration.acceleration_m_s2(time_s),
-        envelope_m_s2=np.array([vibration.envelope_m_s2(time) for time in time_s.tolist()]),
-        peak_m_s2=parameters.peak_m_s2,
-        rms_m_s2=parameters.rms_m_s2,
-        duration_s=parameters.duration_s,
     )

@@ -1,0 +1,78 @@
+"""The figures of one shot and of a vibration."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from analysis.predict.simulate.shot import VIBRATION_POINTS, in_words
+from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
+from device.parameters import GunParameters
+from device.physics import ShotSummary, trace
+from device.vibration import Vibration, VibrationParameters, solved
+
+_COARSE_S = 0.0005  # steps above which a curve is drawn with corners
+_MOST_POINTS = 40_000
+_TITLE_WIDTH = 44
+
+
+def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
+    """The panel of one shot by the model."""
+    shot = trace(parameters)
+    if shot.time_s[-1] - shot.time_s[-2] > _COARSE_S:
+        shot = trace(parameters, min(int(2 * shot.time_s[-1] / _COARSE_S), _MOST_POINTS))
+    return ShotPanel(
+        title=title,
+        time_s=shot.time_s,
+        force_N=shot.force_N,
+        displacement_m=shot.displacement_m,
+        velocity_m_s=shot.velocity_m_s,
+        drive_V=shot.drive_V,
+        stage_ends_s=_ends(shot.summary),
+        collision_force_N=_or_nan(shot.summary.collision_force_N),
+        contact_depth_m=parameters.contact_depth_m,
+        status=shot.summary.status,
+    )
+
+
+def _ends(summary: ShotSummary) -> tuple[float, float, float]:
+    return _or_nan(summary.recoil_end_s), _or_nan(summary.firing_end_s), _or_nan(summary.reset_end_s)
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def write_plot(parameters: GunParameters, path: Path) -> None:
+    """Figure 5's panels of the shot, as PNG and SVG beside each other."""
+    title = "\n".join(textwrap.wrap(_title(parameters), _TITLE_WIDTH))
+    figure_5([shot_panel(title, parameters)], path.with_suffix(""))
+
+
+def _title(parameters: GunParameters) -> str:
+    """The friction, and every number that is not the paper's."""
+    own = (field.name for field in fields(parameters) if getattr(parameters, field.name) != field.default)
+    others = [f"{name} = {in_words(getattr(parameters, name))}" for name in own if name != "friction_N"]
+    return ", ".join([f"friction {parameters.friction_N:g} N", *others])
+
+
+def write_vibration_plot(parameters: VibrationParameters, path: Path) -> None:
+    """The vibration over time, as PNG and SVG beside each other."""
+    figure_vibration(_vibration_panel(parameters, solved(parameters)), path.with_suffix(""))
+
+
+def _vibration_panel(parameters: VibrationParameters, vibration: Vibration) -> VibrationPanel:
+    time_s = np.linspace(0.0, 1.25 * parameters.duration_s, VIBRATION_POINTS)
+    return VibrationPanel(
+        title=f"Vibration, effect {parameters.effect} at {parameters.frequency_Hz:g} Hz",
+        time_s=time_s,
+        acceleration_m_s2=vibration.acceleration_m_s2(time_s),
+        envelope_m_s2=np.array([vibration.envelope_m_s2(time) for time in time_s.tolist()]),
+        peak_m_s2=parameters.peak_m_s2,
+        rms_m_s2=parameters.rms_m_s2,
+        duration_s=parameters.duration_s,
+    )

@@ -1,0 +1,67 @@
+"""What `recoil simulate` is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelRequest:
+    """Which model is wanted: by its name, by a scene's, or by needs, OUTPUT=ERROR each."""
+
+    fidelity: str | None
+    scene: str | None
+    needs: Sequence[str]
+
+    @property
+    def is_of_scene(self) -> bool:
+        """Is the model to be picked for a use of it?"""
+        return self.scene is not None or bool(self.needs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulateRequest:
+    """What to simulate of which gun. `changes` are KEY=VALUE, `vary` KEY=VALUES; `table` takes the shots over these."""
+
+    gun: str
+    method: str | None
+    changes: Sequence[str]
+    model: ModelRequest
+    trace: Path | None
+    plot: Path | None
+    audit: bool
+    hand: str | None
+    contact_stiffness_N_m: float | None
+    vary: Sequence[str]
+    table: Path | None
+    yes: bool
+
+    @property
+    def of_one_shot(self) -> list[str]:
+        """The options given that tell more of a single shot of a coil."""
+        options = {
+            "--audit": self.audit or None,
+            "--hand": self.hand,
+            "--contact-stiffness": self.contact_stiffness_N_m,
+        }
+        return [name for name, value in options.items() if value is not None]
+
+    @property
+    def of_files(self) -> list[str]:
+        """The options given that ask for files of a single shot."""
+        return [name for name, value in (("--trace", self.trace), ("--plot", self.plot)) if value is not None]
+
+    @property
+    def of_models(self) -> list[str]:
+        """The options given that a vibration, which has no model, does not know."""
+        options = {
+            "--fidelity": self.model.fidelity,
+            "--scene": self.model.scene,
+            "--need": self.model.needs,
+            "--set": self.changes,
+            "--vary": self.vary,
+            "--table": self.table,
+        }
+        return [name for name, value in options.items() if value]
