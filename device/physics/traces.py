@@ -9,9 +9,10 @@ while the force fades, and makes or swallows energy. The impulse on the hand ove
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from device.physics.equations import (
     MAX_SEGMENTS,
     SETTLED,
     STOP,
+    Coefficients,
     Constants,
     ShotState,
     StepSeries,
@@ -52,6 +54,14 @@ _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoi
 _REST_AFTER_S = 0.010  # shown after the last motion
 
 
+class CoilSeries(NamedTuple):
+    """Taylor coefficients over one step in the coil, in parts of its span."""
+
+    x: Coefficients
+    v: Coefficients
+    i: Coefficients
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
     """One smooth stretch of a shot. `heading` is 1 away from the stop, -1 towards it, 0 at rest."""
@@ -67,7 +77,7 @@ class Segment:
     end: tuple[float, float, float]  # just before the event: an impact keeps its speed
     ended_by: int
     step_s: float = 1.0
-    series: StepSeries | None = None  # the coil's only
+    series: CoilSeries | None = None  # the coil's only
 
     def at(self, time_s: float) -> tuple[float, float, float]:
         """Position, velocity and current at a time of the segment."""
@@ -101,9 +111,9 @@ def segments(constants: Constants) -> Iterator[Segment]:
     pulse_on(constants, s)
     enter(constants, s, BREAK_AWAY)
     for _ in range(MAX_SEGMENTS):
-        before = replace(s)
+        began = s.kind, s.heading, s.u, s.live, s.time, (s.x, s.v, s.i)
         event = advance(constants, s, w)
-        yield _segment(constants, before, s, w, event)
+        yield _segment(constants, began, s, w, event)
         if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until):
             return
         if event == DRIVE_CHANGE:
@@ -111,22 +121,48 @@ def segments(constants: Constants) -> Iterator[Segment]:
         enter(constants, s, event)
 
 
-def _segment(constants: Constants, before: ShotState, s: ShotState, w: StepSeries, event: int) -> Segment:
-    coil = before.kind == COIL
+_Began = tuple[int, float, float, bool, float, tuple[float, float, float]]
+"""Of a segment: kind, heading, drive, whether current can flow, time, state."""
+
+
+def _segment(constants: Constants, began: _Began, s: ShotState, w: StepSeries, event: int) -> Segment:
+    kind, heading, drive_V, live, start_s, start = began
+    coil = kind == COIL
     return Segment(
         constants=constants,
-        kind=before.kind,
-        heading=before.heading,
-        drive_V=before.u,
-        live=before.live,
-        start_s=before.time,
+        kind=kind,
+        heading=heading,
+        drive_V=drive_V,
+        live=live,
+        start_s=start_s,
         end_s=math.inf if event == SETTLED else s.time,
-        start=(before.x, before.v, before.i),
+        start=start,
         end=(s.x, s.v, s.i),
         ended_by=event,
         step_s=s.span if coil else 1.0,
-        series=StepSeries(x=w.x.copy(), v=w.v.copy(), i=w.i.copy()) if coil else None,
+        series=CoilSeries(w.x.copy(), w.v.copy(), w.i.copy()) if coil else None,
     )
+
+
+def coil_forces(steps: Sequence[Segment], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and the force on the hand, (steps, points + 1), at both ends of each step in the coil and evenly in it.
+
+    The digits of `Segment.at` and `Segment.force`.
+    """
+    p = steps[0].constants
+    columns = [(one.start_s, one.end_s, one.step_s, friction(p, one.heading)) for one in steps]
+    start_s, end_s, step_s, held_N = (column[:, None] for column in np.array(columns).T)
+    times = start_s + (end_s - start_s) * np.arange(points + 1.0) / points
+    times[:, 0] = start_s[:, 0]
+    s = (times - start_s) / step_s
+    x, i = (value_at(_coefficients(steps, name), s) for name in ("x", "i"))
+    motor = p.motor_constant * np.maximum(0.0, (p.coil_reach - x) / p.coil_reach) * i
+    return times, motor - spring_force(p, x) + held_N
+
+
+def _coefficients(steps: Sequence[Segment], name: str) -> Any:
+    """One series of each step, (ORDER + 1, steps, 1): numbers for `value_at` as arrays."""
+    return np.array([getattr(one.series, name) for one in steps]).T[:, :, None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

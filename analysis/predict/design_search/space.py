@@ -18,7 +18,7 @@ from device.limits import MAX_SHOTS_PER_MINUTE
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, simulate_batch
 from device.physics.equations import COIL, FREE, HOME, STATUSES, pack
-from device.physics.traces import segments
+from device.physics.traces import Segment, coil_forces, segments
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
@@ -248,15 +248,28 @@ def _course(gun: GunParameters, coil_points: int, free_points: int) -> tuple[lis
     """Times and the force on the hand at both ends of each stretch and evenly in it; 0 from the last rest on."""
     times: list[float] = []
     forces: list[float] = []
-    parts = {COIL: coil_points, FREE: free_points}
+    coil: list[Segment] = []
     for stretch in segments(pack(gun)):
-        lasting = stretch.end_s < math.inf
-        count = parts.get(stretch.kind, 1) if lasting else 0
-        for n in range(count + 1):
+        if stretch.kind == COIL:
+            coil.append(stretch)
+            continue
+        _extend(times, forces, coil, coil_points)
+        coil = []
+        count = free_points if stretch.kind == FREE else 1
+        for n in range(count + 1 if stretch.end_s < math.inf else 1):
             at_s = stretch.start_s + (stretch.end_s - stretch.start_s) * n / count if n else stretch.start_s
             times.append(at_s)
             forces.append(stretch.force(stretch.at(at_s)))
+    _extend(times, forces, coil, coil_points)
     return times, forces
+
+
+def _extend(times: list[float], forces: list[float], coil: Sequence[Segment], points: int) -> None:
+    """Add the steps in the coil that follow each other."""
+    if coil:
+        at_s, force_N = coil_forces(coil, points)
+        times += at_s.ravel().tolist()
+        forces += force_N.ravel().tolist()
 
 
 def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...]) -> list[FrictionRow]:
