@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from analysis.psychometric.paired import PairModel, circular_triads, paired_scores
 
@@ -50,6 +50,18 @@ def test_ties_are_fitted_as_often_as_they_come(model: PairModel) -> None:
     else:
         assert norm.cdf(difference - found.tie) == pytest.approx(0.5, abs=1e-6)
         assert norm.cdf(-difference - found.tie) == pytest.approx(0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("wins", "ties"),
+    [([[0, 0], [0, 0]], [[0, 4], [4, 0]]), ([[0, 5], [0, 0]], [[0, 2], [2, 0]])],
+    ids=["ties alone", "never the other way"],
+)
+def test_ties_that_leave_no_best_scores_are_told(model: PairModel, wins: Any, ties: Any) -> None:
+    found = paired_scores(["a", "b"], wins, ties, model=model)
+    assert found.reason is not None
+    assert "ties" in found.reason
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -106,3 +118,24 @@ def test_circular_triads_are_counted_as_by_hand(n: int, draws: Any) -> None:
 
 def test_an_incomplete_design_has_no_coefficient() -> None:
     assert circular_triads(list("abc"), [[0, 1, 0], [0, 0, 0], [0, 0, 0]]).zeta is None
+
+
+def test_people_who_differ_widen_the_intervals_and_leave_the_scores() -> None:
+    """Half of the people choose all one way, half the other, against people who all choose alike."""
+    one = np.array([[0, 8, 8], [2, 0, 8], [2, 2, 0]])
+    alike, apart = np.stack([one + one.T] * 8), np.stack([one * 2, one.T * 2] * 4)
+    together = paired_scores(["a", "b", "c"], alike)
+    differing = paired_scores(["a", "b", "c"], apart)
+    assert [x.score for x in differing.scores] == pytest.approx([x.score for x in together.scores], abs=1e-8)
+    assert differing.people == 8
+    assert differing.scores[0].high > 2 * together.scores[0].high
+
+
+def test_of_two_items_the_sandwich_is_that_of_a_mean_of_shares() -> None:
+    """By hand: the logit of a share p has the slope 1 / (p (1 - p)); the share is the mean over 5 people."""
+    shares = np.array([0.9, 0.8, 0.4, 0.6, 0.8])
+    wins = np.array([[[0, 10 * p], [10 * (1 - p), 0]] for p in shares]).round()
+    found = paired_scores(["a", "b"], wins)
+    mean, se = shares.mean(), shares.std(ddof=1) / np.sqrt(5)
+    reach = t.ppf(0.975, 4) * se / (mean * (1 - mean)) / 2
+    assert found.scores[0].high - found.scores[0].score == pytest.approx(reach, rel=1e-6)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.sparse.csgraph import connected_components
-from scipy.special import log_expit, log_ndtr, logsumexp, ndtri
+from scipy.special import log_expit, log_ndtr, logsumexp, ndtri, stdtrit
 
 from analysis.stats.arrays import FloatArray, numbers, one_of, row_labels, share
 from analysis.stats.frames import Result
@@ -18,6 +18,8 @@ from analysis.stats.frames import Result
 PairModel = Literal["bradley-terry", "thurstone"]
 _LEAST = -40.0
 """A log probability below which nothing more is told apart."""
+_MOST = 40.0
+"""A score, or an error of one, beyond which there is none."""
 _STEP, _POLISHED = 1e-3, 20
 """Of derivatives by differences of the fourth order, whose error is that of rounding; Newton's steps at most."""
 
@@ -35,9 +37,13 @@ class ItemScore(Result):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedScores(Result):
-    """The scores of all items in their order; none for a `reason`. `tie`: the tie parameter, 0 without ties."""
+    """The scores of all items in their order; none for a `reason`. `tie`: the tie parameter, 0 without ties.
+
+    `people`: the intervals allow for differences between so many people; 1: answers are taken as independent.
+    """
 
     model: PairModel
+    people: int = 1
     scores: tuple[ItemScore, ...] = ()
     tie: float = 0.0
     log_likelihood: float | None = None
@@ -68,7 +74,9 @@ def paired_scores(
 
     Bradley and Terry: P(i over j) = 1 / (1 + exp(s_j - s_i)), with `ties` (n, n; each pair's, on both sides) as
     Davidson (1970) has them: P(tie) is proportional to ν √(w_i w_j). Thurstone's case V: P(i over j) = Φ(s_i - s_j),
-    with ties where the difference is within τ (Glenn and David 1960). Intervals are score ± z se.
+    with ties where the difference is within τ (Glenn and David 1960). Intervals are score ± z se; with `wins` (and
+    `ties`) of the shape (people, n, n) the wider of these and score ± t se of a sandwich over people (Liang and Zeger
+    1986, times people / (people - 1)), with people - 1 degrees of freedom.
     There are no scores, and a `reason`, where some items were never chosen over the others (Ford 1957): one could be as
     far above as one likes. `ValueError`: counts that are none, or not of a square of the items.
 
@@ -77,26 +85,35 @@ def paired_scores(
     [('a', 0.944), ('b', -0.16), ('c', -0.783)]
     """
     items = row_labels(items, "items")
-    won, tied = _checked(items, wins, "wins"), np.zeros((len(items), len(items)))
-    if ties is not None:
-        tied = _checked(items, ties, "ties")
-        if not np.array_equal(tied, tied.T):
-            raise ValueError("ties must be the same on both sides of each pair")
+    wins_of = _of_people(items, wins, "wins")
+    ties_of = np.zeros_like(wins_of) if ties is None else _of_people(items, ties, "ties")
+    if not np.array_equal(ties_of, ties_of.swapaxes(1, 2)):
+        raise ValueError("ties must be the same on both sides of each pair")
+    if len(ties_of) != len(wins_of):
+        raise ValueError(f"ties must be of as many people as wins, {len(wins_of)}, not {len(ties_of)}")
+    won, tied = wins_of.sum(axis=0), ties_of.sum(axis=0)
     one_of(model, "model", get_args(PairModel))
     level = share(confidence, "confidence")
     if reason := _not_connected(items, won + tied / 2):
         return PairedScores(model=model, reason=reason)
-    free = len(items) - 1 + bool(tied.any())
-    fit = _maximum(lambda at: -_log_likelihood(at, won, tied, model), np.zeros(free))
-    covariance = np.linalg.inv(_curvature(lambda at: -_log_likelihood(at, won, tied, model), fit))
-    basis = _basis(len(items))
-    scores, spread = basis @ fit[: len(items) - 1], basis @ covariance[: len(items) - 1, : len(items) - 1] @ basis.T
-    z, ses = float(ndtri((1 + level) / 2)), np.sqrt(np.diag(spread))
+    found = _fitted(won, tied, model)
+    if found is None:
+        return PairedScores(model=model, reason="with so many ties no scores are the best; a few more choices would do")
+    fit, covariance = found
+    basis, people = _basis(len(items)), len(wins_of)
+    scores, ses = basis @ fit[: len(items) - 1], _errors(basis, covariance)
+    reach = float(ndtri((1 + level) / 2)) * ses
+    if people > 1:
+        slopes = _slopes(fit, wins_of, ties_of, model)
+        between = np.asarray(covariance @ slopes.T @ slopes @ covariance * people / (people - 1))
+        robust = _errors(basis, between)
+        ses, reach = np.maximum(ses, robust), np.maximum(reach, stdtrit(people - 1, (1 + level) / 2) * robust)
     return PairedScores(
         model=model,
+        people=people,
         scores=tuple(
-            ItemScore(item=item, score=float(s), se=float(se), low=float(s - z * se), high=float(s + z * se))
-            for item, s, se in zip(items, scores, ses, strict=True)
+            ItemScore(item=item, score=float(s), se=float(se), low=float(s - half), high=float(s + half))
+            for item, s, se, half in zip(items, scores, ses, reach, strict=True)
         ),
         tie=float(np.exp(fit[-1])) if tied.any() else 0.0,
         log_likelihood=float(_log_likelihood(fit, won, tied, model)),
@@ -119,6 +136,52 @@ def circular_triads(items: Sequence[Hashable], wins: ArrayLike) -> Consistency:
     most = (n**3 - (n if n % 2 else 4 * n)) / 24
     complete = n > 2 and decided.sum() == n * (n - 1)
     return Consistency(triads=triads, circular=circular, zeta=1 - circular / most if complete else None)
+
+
+def _fitted(won: FloatArray, tied: FloatArray, model: PairModel) -> tuple[FloatArray, FloatArray] | None:
+    """The parameters at the maximum and their covariance; `None` where ties lead beyond all bounds."""
+
+    def loss(at: FloatArray) -> float:
+        return -_log_likelihood(at, won, tied, model)
+
+    if not won.any():
+        return None
+    try:
+        fit = _maximum(loss, np.zeros(len(won) - 1 + bool(tied.any())))
+        covariance = np.asarray(np.linalg.inv(_curvature(loss, fit)), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return None
+    held = np.abs(fit).max() < _MOST and np.all((np.diag(covariance) > 0) & (np.diag(covariance) < _MOST**2))
+    return (fit, covariance) if held else None
+
+
+def _errors(basis: FloatArray, covariance: FloatArray) -> FloatArray:
+    free = basis.shape[1]
+    return np.asarray(np.sqrt(np.diag(basis @ covariance[:free, :free] @ basis.T)))
+
+
+def _slopes(at: FloatArray, wins: FloatArray, ties: FloatArray, model: PairModel) -> FloatArray:
+    """Each person's slope of the log likelihood (people, parameters), which is linear in their counts."""
+    with_ties = bool(ties.any())
+
+    def terms(place: FloatArray) -> FloatArray:
+        return np.stack(_terms(place, wins.shape[-1], model, with_ties=with_ties))
+
+    steps = np.eye(at.size) * _STEP
+    rises = [
+        (8 * (terms(at + h) - terms(at - h)) - terms(at + 2 * h) + terms(at - 2 * h)) / (12 * _STEP) for h in steps
+    ]
+    return np.asarray(np.einsum("cpij,kcij->pk", np.stack([wins, ties / 2]), np.stack(rises)))
+
+
+def _of_people(items: Sequence[Hashable], counts: ArrayLike, name: str) -> FloatArray:
+    """Counts (people, n, n), each person's checked; of one without the first axis."""
+    found = numbers(counts, name)
+    if found.ndim != 3:
+        return _checked(items, found, name)[None]
+    if not len(found):
+        raise ValueError(f"{name} must be of at least one person")
+    return np.stack([_checked(items, one, name) for one in found])
 
 
 def _checked(items: Sequence[Hashable], counts: ArrayLike, name: str) -> FloatArray:
@@ -157,12 +220,17 @@ def _basis(n: int) -> FloatArray:
 
 
 def _log_likelihood(at: FloatArray, won: FloatArray, tied: FloatArray, model: PairModel) -> float:
-    n = len(won)
+    chosen, drawn = _terms(at, len(won), model, with_ties=bool(tied.any()))
+    return float((won * chosen).sum() + (tied * drawn).sum() / 2)
+
+
+def _terms(at: FloatArray, n: int, model: PairModel, *, with_ties: bool) -> tuple[FloatArray, FloatArray]:
+    """The log probabilities (n, n) that the row is chosen over the column, and of a tie."""
     scores = _basis(n) @ at[: n - 1]
     difference = scores[:, None] - scores
-    if not tied.any():
+    if not with_ties:
         chosen = log_expit(difference) if model == "bradley-terry" else log_ndtr(difference)
-        return float((won * chosen).sum())
+        return chosen, np.zeros_like(chosen)
     if model == "bradley-terry":
         middle = at[-1] + np.zeros_like(difference)
         total = logsumexp([difference / 2, -difference / 2, middle], axis=0)
@@ -172,7 +240,7 @@ def _log_likelihood(at: FloatArray, won: FloatArray, tied: FloatArray, model: Pa
         chosen = log_ndtr(difference - reach)
         upper, lower = log_ndtr(reach - difference), log_ndtr(-reach - difference)
         drawn = upper + np.log(np.maximum(-np.expm1(lower - upper), np.exp(_LEAST)))
-    return float((won * chosen).sum() + (tied * drawn).sum() / 2)
+    return chosen, drawn
 
 
 def _maximum(loss: Callable[[FloatArray], float], start: FloatArray) -> FloatArray:

@@ -65,7 +65,7 @@ def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group
     )
 
 
-def _people(draws: Sequence[FloatArray]) -> list[FloatArray]:
+def _people(draws: object) -> list[FloatArray]:
     if not isinstance(draws, Sequence | np.ndarray) or isinstance(draws, str | bytes):
         raise ValueError(f"draws must be a list of each person's, not {in_brief(draws)}")
     people = [numbers(one, f"draws[{place}]") for place, one in enumerate(draws)]

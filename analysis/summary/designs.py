@@ -23,6 +23,7 @@ from analysis.stats.diagnostics import effect_size, unit_scaled
 from analysis.stats.discrimination import Task, discrimination
 from analysis.stats.factorial import factorial_anova
 from analysis.stats.paired import friedman
+from analysis.summary.pairs import paired_comparison
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary, Origin
 from analysis.summary.thresholds import MOST_COMPARED, thresholds
@@ -52,7 +53,9 @@ def summarise(
         factors={name: factor.all_levels for name, factor in design.factors.items()},
         questions={
             name: replace(
-                _question(design, name, question, table), thresholds=thresholds(design, name, table, everybody=fits)
+                _question(design, name, question, table),
+                thresholds=thresholds(design, name, table, everybody=fits),
+                pairs=paired_comparison(design, name, table),
             )
             for name, question in asked.items()
         },
@@ -129,7 +132,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         tests=tests,
         left_out=found.left_out,
         chance=chance(question),
-        preferred=_preferred(design, question, scored),
+        preferred=_preferred(design, name, question, scored),
         scale=_scale(question),
     )
 
@@ -166,14 +169,16 @@ def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[C
 
 
 def _preferred(
-    design: DesignConfig, question: QuestionConfig, scored: pd.DataFrame
+    design: DesignConfig, name: str, question: QuestionConfig, scored: pd.DataFrame
 ) -> tuple[ConditionSummary, ...] | None:
     """How often each level of a pair was chosen: in the mean over people, of all their trials that had it."""
     compared = design.trial.compare
     if design.trial.kind != "pair" or compared is None or question.kind != "choice" or question.correct is not None:
         return None
+    tied = ~scored[name].isin(question.answers[:2])
+    chosen = scored["score"].where(~tied, 0.5)  # of neither
     halves = [
-        scored.assign(level=scored[f"{compared}_{place}"], score=scored["score"] if place == 1 else 1 - scored["score"])
+        scored.assign(level=scored[f"{compared}_{place}"], score=chosen if place == 1 else 1 - chosen)
         for place in (1, 2)
     ]
     both = pd.concat(halves)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from analysis.report.serial import OPTIONAL
+from analysis.summary.pairs import PairedComparison
 from analysis.summary.thresholds import Thresholds
 from experiments.design.language import Level
 
@@ -50,7 +51,7 @@ class QuestionSummary:
 
     `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
     level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean. `thresholds`: the
-    psychometric functions over a numeric factor, where an answer can be a success.
+    psychometric functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
     """
 
     kind: str
@@ -61,3 +62,4 @@ class QuestionSummary:
     preferred: tuple[ConditionSummary, ...] | None = field(default=None, metadata=OPTIONAL)
     scale: str | None = field(default=None, metadata=OPTIONAL)
     thresholds: Thresholds | None = field(default=None, metadata=OPTIONAL)
+    pairs: PairedComparison | None = field(default=None, metadata=OPTIONAL)

@@ -12,6 +12,7 @@ from analysis.report.section import Picture, Section, Table
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.content import TWO_PEOPLE, ReportData
+from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from experiments.design.language import Level
@@ -37,6 +38,7 @@ def sections_of_designs(report: ReportData) -> Iterator[Section]:
     for name, found in report.statistics.designs.items():
         yield _design_section(name, found)
         yield from threshold_sections(name, found)
+        yield from pair_sections(name, found)
 
 
 def _design_section(name: str, found: DesignSummary) -> Section:
@@ -69,7 +71,8 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
         if question.cells:
             tests = [*_tests_words(question, exact=exact)]
             few = [TWO_PEOPLE] if found.n == 2 and tests else []
-            told = " ".join([_cells_words(found, question), *tests, *few, *threshold_sentences(found, question)])
+            fitted = [*threshold_sentences(found, question), *pair_sentences(found, question)]
+            told = " ".join([_cells_words(found, question), *tests, *few, *fitted])
             yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 

@@ -12,6 +12,7 @@ from analysis.report.labels import display_name
 from analysis.report.section import Picture
 from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.functions import figure_functions
+from analysis.summary.figures.pairs import figure_pairs, has_scores
 from analysis.summary.figures.results import figure_8, figure_directions, has_matrix
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
@@ -49,15 +50,17 @@ def write_figures(folder: Path, report: ReportData) -> None:
             figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
     for name, one in drawn_designs(statistics).items():
         figure_design(one, folder / figure_of(name))
-        _write_functions(folder, name, one)
+        _write_models(folder, name, one)
     if report.panels:
         figure_5(report.panels, folder / _SHOT_FIGURE)
 
 
-def _write_functions(folder: Path, name: str, design: DesignSummary) -> None:
+def _write_models(folder: Path, name: str, design: DesignSummary) -> None:
     for asked, question in design.questions.items():
         if question.thresholds is not None and question.thresholds.conditions:
             figure_functions(design, question.thresholds, folder / functions_figure_of(name, asked))
+        if question.pairs is not None and has_scores(question.pairs):
+            figure_pairs(design, question.pairs, folder / pairs_figure_of(name, asked))
 
 
 def figure_of(name: str) -> str:
@@ -68,6 +71,11 @@ def figure_of(name: str) -> str:
 def functions_figure_of(name: str, question: str) -> str:
     """The stem of the figure of a question's psychometric functions."""
     return f"figure-{name}-{question}-functions"
+
+
+def pairs_figure_of(name: str, question: str) -> str:
+    """The stem of the figure of a question's scores from paired comparison."""
+    return f"figure-{name}-{question}-scores"
 
 
 def drawn_designs(statistics: StudyStatistics) -> dict[str, DesignSummary]:

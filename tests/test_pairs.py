@@ -1,0 +1,85 @@
+"""Paired comparison in a design: counts, scores, ties, circles, what cannot be scored, and the pages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.psychometric.paired import paired_scores
+from analysis.summary.designs import summarise
+from analysis.summary.figures.pairs import figure_pairs, has_scores
+from analysis.summary.pairs import PairedComparison, paired_comparison
+from analysis.summary.sections.pairs import pair_sections, pair_sentences
+from experiments.design.config import DesignConfig
+from tests.tables_of_designs import loaded, simulated
+
+
+@pytest.fixture(scope="module")
+def config() -> DesignConfig:
+    return loaded("pairs")[0]
+
+
+@pytest.fixture(scope="module")
+def table() -> pd.DataFrame:
+    return simulated(*loaded("pairs"), 4)
+
+
+@pytest.fixture(scope="module")
+def found(config: DesignConfig, table: pd.DataFrame) -> PairedComparison:
+    one = paired_comparison(config, "rather", table)
+    assert one is not None
+    return one
+
+
+def test_wins_are_counted_in_both_orders_and_scored(found: PairedComparison, table: pd.DataFrame) -> None:
+    (condition,) = found.conditions
+    first = table[(table["method_1"] == "strong") & (table["method_2"] == "vibration")]
+    second = table[(table["method_2"] == "strong") & (table["method_1"] == "vibration")]
+    wins = (first["rather"] == "first").sum() + (second["rather"] == "second").sum()
+    assert condition.wins[found.items.index("strong")][found.items.index("vibration")] == wins
+    assert (condition.trials, found.people) == (80, 4)
+    by_hand = paired_scores(found.items, np.array(condition.wins))
+    assert [one.score for one in condition.scores[0].scores] == pytest.approx([one.score for one in by_hand.scores])
+    assert len(condition.participants) == 4
+
+
+def test_a_third_answer_is_a_tie_and_half_a_choice(config: DesignConfig, table: pd.DataFrame) -> None:
+    values = config.model_dump()
+    values["questions"]["rather"] |= {"answers": ("first", "second", "neither"), "keys": {}}
+    three = DesignConfig.model_validate(values)
+    all_ties = table.assign(rather="neither")
+    one = summarise(three, all_ties).questions["rather"]
+    assert one.pairs is not None
+    assert sum(map(sum, one.pairs.conditions[0].ties)) == 2 * len(table)
+    assert one.preferred is not None
+    assert {cell.mean for cell in one.preferred} == {0.5}
+    some = table["rather"].where(np.arange(len(table)) % 4 > 0, "neither")
+    scores = summarise(three, table.assign(rather=some)).questions["rather"].pairs
+    assert scores is not None
+    assert scores.conditions[0].scores[0].tie > 0
+
+
+def test_items_that_were_never_chosen_are_named(config: DesignConfig, table: pd.DataFrame) -> None:
+    never = table[(table["method_1"] != "soft") & (table["method_2"] != "soft")]
+    summary = summarise(config, never)
+    (sentence,) = pair_sentences(summary, summary.questions["rather"])
+    assert sentence == "No scores: never compared with each other: vibration, short, paper, strong | soft."
+    (section,) = pair_sections("pairs", summary)
+    assert section.pictures == ()
+
+
+def test_the_pages_have_scores_of_both_models_and_everybodys_circles(
+    config: DesignConfig, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    summary = summarise(config, table)
+    (section,) = pair_sections("pairs", summary)
+    assert [len(one.rows) for one in section.tables] == [5, 4]
+    assert all(len(row) == len(one.header) for one in section.tables for row in one.rows)
+    of: Any = summary.questions["rather"].pairs
+    assert has_scores(of)
+    figure_pairs(summary, of, tmp_path / "scores")
+    assert (tmp_path / "scores.png").is_file()
