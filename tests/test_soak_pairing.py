@@ -94,7 +94,7 @@ def test_the_share_of_a_full_designs_trials(study: Study, promised: bool, soak: 
         "more than all" if enough is None else f"{100 * enough / study.trials:.0f} %, {enough} of {study.trials}",
         "60 %" if promised else "stated",
         f"{study.studies} studies; Spearman's correlation with the true scores: full design {full.mean():.4f}, active"
-        f" pairing at 60 % {full.mean() + less.mean():.4f} (difference {less.mean():+.4f} ± {error:.4f}); first mark of 5 %",
+        f" pairing at 60 % {full.mean() + less.mean():.4f} (difference {less.mean():+.4f} ± {error:.4f}); steps of 5 %",
     )
     assert not promised or less.mean() + error >= 0
     assert not promised or (enough is not None and enough <= PROMISED * study.trials + 0.5)

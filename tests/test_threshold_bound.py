@@ -1,4 +1,4 @@
-"""The bound of a threshold's error: the least over all placements of trials, by brute force and by an outside number."""
+"""The bound of a threshold's error is the least over all placements of trials: by brute force, and in a book."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RATES = [(0.5, 0.0), (0.5, 0.02), (1 / 3, 0.1), (0.02, 0.02), (0.0, 0.0), (0.0, 
 
 @pytest.mark.parametrize(("guess", "lapse"), RATES)
 def test_no_placement_of_trials_beats_the_bound(guess: float, lapse: float) -> None:
-    """Elfving's theorem as a linear programme: the farthest point (t, 0) in the hull of ± s(z) (1, z) has 1/t² = n var."""
+    """Elfving's theorem as a linear programme: the farthest (t, 0) in the hull of ± s(z) (1, z) has 1/t² = n var."""
     z = np.linspace(-5, 5, 401)
     share = guess + (1 - guess - lapse) * norm.cdf(z)
     told = (1 - guess - lapse) * norm.pdf(z) / np.sqrt(share * (1 - share))

@@ -92,7 +92,7 @@ def next_pair(rule: PairingRule, wins: Shares, last: NDArray[np.intp]) -> NDArra
 
 
 def item_posterior(wins: Shares, spread: float) -> tuple[Shares, Shares]:
-    """The items' likeliest scores (..., items), and their covariance (..., items, items), by Laplace's approximation."""
+    """The items' likeliest scores (..., items) and their covariance (..., items, items), by Laplace's approximation."""
     wins = np.asarray(wins, float)
     compared, own = wins + wins.swapaxes(-1, -2), np.arange(wins.shape[-1])
     scores = np.zeros(wins.shape[:-1])
@@ -106,7 +106,7 @@ def item_posterior(wins: Shares, spread: float) -> tuple[Shares, Shares]:
         scores = scores + step * np.minimum(1, _FARTHEST / np.maximum(np.abs(step), _FARTHEST).max(-1, keepdims=True))
         if np.abs(step).max() < _REACHED:
             break
-    return scores, np.linalg.inv(curvature)
+    return np.asarray(scores), np.asarray(np.linalg.inv(curvature))
 
 
 def order_gains(rule: PairingRule, scores: Shares, covariance: Shares) -> Shares:

@@ -1,0 +1,128 @@
+"""The gun's own threshold: an adaptive run on the simulated gun brackets the voltage that the percept gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from analysis.paper.recurrence import wilson_interval
+from analysis.psychometric.fit import PsychometricFit, psychometric_fit
+from analysis.psychometric.priors import PlateauPrior, Priors
+from device.methods import paper_methods
+from device.parameters import GunParameters
+from experiments.design.procedures.posterior import best_stimulus, parameter_grid, posterior_after, variance_rule
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percept_of
+from tests.conftest import Soak
+
+pytestmark = pytest.mark.soak
+
+RUNS, WANTED = 500, 0.93
+VOLTAGES = np.arange(2.0, 24.01, 0.5)
+LAPSES = np.array([0.0, 0.02, 0.04, 0.06, 0.08])
+PRIORS = Priors(
+    threshold=PlateauPrior(low=0.0, flat_from=2.0, flat_to=24.0, high=30.0),
+    width=PlateauPrior(low=1.0, flat_from=3.0, flat_to=60.0, high=90.0),
+)
+
+
+@dataclass(frozen=True)
+class Somebody:
+    """A model-based participant who says which way a method's shot went, forward as often as backward."""
+
+    method: str
+    sensitivity: float
+    trials: int
+
+
+def shares_right(someone: Somebody) -> np.ndarray:
+    """How often they are right at each voltage: from the physics of the shot through the percept."""
+    gun = paper_methods()[someone.method]
+    assert isinstance(gun, GunParameters)
+    percept = PerceptParameters(sensitivity=someone.sensitivity)
+    felt = [percept_of(replace(gun, voltage_V=float(voltage)), percept.leak_s) for voltage in VOLTAGES]
+    log_odds = np.array([evidence(one, percept) for one in felt])
+    forward, backward = (forward_rates(sign * log_odds, percept.start, People()) for sign in (1, -1))
+    return np.asarray((forward + 1 - backward) / 2)
+
+
+def adaptive_runs(shares: np.ndarray, trials: int) -> tuple[np.ndarray, np.ndarray]:
+    """Trials and right answers (runs, voltages) of the posterior rule."""
+    known = parameter_grid(
+        stimuli=VOLTAGES,
+        thresholds=np.linspace(0, 30, 60),
+        widths=np.geomspace(3, 80, 20),
+        lapses=LAPSES,
+        guesses=np.array([0.5]),
+        prior=np.ones((60, 20, 5, 1)) * np.exp(-LAPSES / 0.03)[:, None],
+    )
+    rule, draws, runs = variance_rule(known), np.random.default_rng(16), np.arange(RUNS)
+    posterior = np.broadcast_to(known.start(), (RUNS, *known.shape))
+    given, right = np.zeros((2, RUNS, len(VOLTAGES)))
+    for _ in range(trials):
+        stimulus = best_stimulus(rule.gains(posterior))
+        answer = draws.random(RUNS) < shares[stimulus]
+        given[runs, stimulus] += 1
+        right[runs, stimulus] += answer
+        posterior = posterior_after(known, posterior, stimulus, answer)
+    return given, right
+
+
+def fitted(given: np.ndarray, right: np.ndarray) -> PsychometricFit:
+    shown = given > 0
+    return psychometric_fit(VOLTAGES[shown], right[shown], given[shown], guess=0.5, shape="logistic", priors=PRIORS)
+
+
+def voltage_at(found: PsychometricFit, share: float) -> np.ndarray:
+    """The voltage with so many right answers, lapses included: its 95 % interval around the median."""
+    threshold, width, lapse, guess = found.draws.T[:4]
+    felt = np.clip((share - guess) / (1 - guess - lapse), 1e-9, 1 - 1e-9)
+    return np.quantile(threshold + width * np.log(felt / (1 - felt)) / (2 * np.log(19)), [0.025, 0.5, 0.975])
+
+
+@pytest.mark.parametrize(
+    "someone",
+    [
+        Somebody("asymmetric-1", 0.213, 160),
+        Somebody("asymmetric-2", 0.213, 160),
+        Somebody("asymmetric-1", 0.639, 160),
+        Somebody("asymmetric-2", 0.639, 160),
+        Somebody("asymmetric-2", 0.639, 480),
+    ],
+    ids=str,
+)
+def test_a_run_brackets_the_voltage_of_three_in_four(someone: Somebody, soak: Soak) -> None:
+    shares = shares_right(someone)
+    true = float(np.interp(0.75, shares, VOLTAGES))
+    fits = [fitted(*counts) for counts in zip(*adaptive_runs(shares, someone.trials), strict=True)]
+    starts, estimates, ends = np.array([voltage_at(found, 0.75) for found in fits]).T
+    held = int(((starts <= true) & (true <= ends)).sum())
+    low, high = wilson_interval(held, RUNS)
+    who = f"{someone.method}, {someone.sensitivity / 0.213:.0f} x the paper's sensitivity, {someone.trials} trials"
+    soak(
+        f"{who}: voltage of 75 % in the 95 % interval",
+        f"{100 * held / RUNS:.1f} % [{100 * low:.1f}, {100 * high:.1f}]",
+        f"{100 * WANTED:.0f} %",
+        f"{RUNS} runs of the posterior rule; true {true:.2f} V, median estimate off by"
+        f" {np.median(estimates) - true:+.2f} V, interval {np.median(ends - starts):.1f} V wide in the median;"
+        f" the fit check has p < .05 in {100 * np.mean([found.goodness.p < 0.05 for found in fits]):.1f} % of runs",
+    )
+    assert held >= WANTED * RUNS
+
+
+@pytest.mark.parametrize("method", ["asymmetric-1", "asymmetric-2"])
+def test_the_fit_check_says_that_the_curve_is_not_logistic(method: str, soak: Soak) -> None:
+    shares = shares_right(Somebody(method, 0.213, 0))
+    for trials in (100, 400, 2000):
+        right = np.random.default_rng(24).binomial(trials, shares, (20, len(VOLTAGES))).astype(float)
+        fits = [fitted(np.full(len(VOLTAGES), float(trials)), one) for one in right]
+        noticed = sum(found.goodness.p < 0.05 for found in fits)
+        soak(
+            f"{method}: its curve is noticed to be not logistic, {trials:,} trials a voltage",
+            f"{noticed} of 20 data sets",
+            "20 of 20" if trials == 2000 else "stated",
+            f"{len(VOLTAGES)} voltages, p < .05; median p {np.median([found.goodness.p for found in fits]):.3f}",
+        )
+    assert noticed == 20
