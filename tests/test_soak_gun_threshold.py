@@ -13,6 +13,7 @@ from analysis.psychometric.priors import PlateauPrior, Priors
 from device.methods import paper_methods
 from device.parameters import GunParameters
 from experiments.design.procedures.posterior import best_stimulus, parameter_grid, posterior_after, variance_rule
+from experiments.design.procedures.psychometric import share_felt
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percept_of
 from tests.conftest import Soak
@@ -116,13 +117,24 @@ def test_a_run_brackets_the_voltage_of_three_in_four(someone: Somebody, soak: So
 def test_the_fit_check_says_that_the_curve_is_not_logistic(method: str, soak: Soak) -> None:
     shares = shares_right(Somebody(method, 0.213, 0))
     for trials in (100, 400, 2000):
-        right = np.random.default_rng(24).binomial(trials, shares, (20, len(VOLTAGES))).astype(float)
-        fits = [fitted(np.full(len(VOLTAGES), float(trials)), one) for one in right]
-        noticed = sum(found.goodness.p < 0.05 for found in fits)
+        p = fit_checks(shares, trials)
         soak(
             f"{method}: its curve is noticed to be not logistic, {trials:,} trials a voltage",
-            f"{noticed} of 20 data sets",
+            f"{(p < 0.05).sum()} of 20 data sets",
             "20 of 20" if trials == 2000 else "stated",
-            f"{len(VOLTAGES)} voltages, p < .05; median p {np.median([found.goodness.p for found in fits]):.3f}",
+            f"{len(VOLTAGES)} voltages, p < .05; median p {np.median(p):.3f}",
         )
-    assert noticed == 20
+    assert (p < 0.05).all()
+
+
+def test_a_curve_that_is_logistic_is_not_noticed(soak: Soak) -> None:
+    p = fit_checks(0.5 + share_felt(VOLTAGES, 16.0, 37.0, "logistic") / 2, 2000)
+    how = f"45 voltages, p < .05; median p {np.median(p):.3f}"
+    soak("a logistic curve is noticed, 2,000 trials a voltage", f"{(p < 0.05).sum()} of 20 data sets", "at most 4", how)
+    assert (p < 0.05).sum() <= 4
+
+
+def fit_checks(shares: np.ndarray, trials: int) -> np.ndarray:
+    """The p of the fit check for 20 data sets of so many trials a voltage."""
+    right = np.random.default_rng(24).binomial(trials, shares, (20, len(VOLTAGES))).astype(float)
+    return np.array([fitted(np.full(len(VOLTAGES), float(trials)), one).goodness.p for one in right])
