@@ -139,3 +139,14 @@ def test_of_two_items_the_sandwich_is_that_of_a_mean_of_shares() -> None:
     mean, se = shares.mean(), shares.std(ddof=1) / np.sqrt(5)
     reach = t.ppf(0.975, 4) * se / (mean * (1 - mean)) / 2
     assert found.scores[0].high - found.scores[0].score == pytest.approx(reach, rel=1e-6)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_scores_and_errors_are_those_of_r(model: PairModel) -> None:
+    """`glm` with a logit or probit. Its errors are by the expected information, which is the observed one of a logit."""
+    by_r = json.loads((Path(__file__).parent / "golden" / "r" / "pairs_expected.json").read_text())["cases"]
+    for ours, theirs in list(zip(GOLDEN, by_r, strict=True))[12:18]:
+        found = paired_scores(range(len(ours["wins"])), ours["wins"], model=model)
+        assert [one.score for one in found.scores] == pytest.approx(theirs[model]["scores"], abs=1e-6)
+        errors = [one.se for one in found.scores]
+        assert errors == pytest.approx(theirs[model]["se"], rel=1e-6 if model == "bradley-terry" else 0.06)

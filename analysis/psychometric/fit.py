@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,9 +20,10 @@ from experiments.design.procedures.psychometric import Shape, share_felt
 
 _DRAWS = 4000
 """Draws from the posterior, for what follows from several parameters at once."""
+_PLACES = np.arange(_DRAWS)
 _MOST_TRIALS = 1e6
-_ALPHAS = 1.1347241384015194 ** -np.arange(1.0, 6.0)
-"""Their multiples fill a cube of five dimensions evenly: the base is the root of x^6 = x + 1."""
+_EVEN = (0.5 + np.outer(1.1347241384015194 ** -np.arange(1.0, 6.0), np.arange(_DRAWS))) % 1
+"""(5, _DRAWS): they fill a cube of five dimensions evenly; the base is the root of x^6 = x + 1."""
 
 ThresholdPlace = Literal["within", "below", "above", "unknown"]
 
@@ -222,9 +224,8 @@ def _draws(found: Posterior) -> FloatArray:
     passed = np.cumsum(found.weights.ravel())
     places = np.searchsorted(passed, (np.arange(_DRAWS) + 0.5) / _DRAWS * passed[-1])
     cells = np.unravel_index(np.minimum(places, passed.size - 1), found.weights.shape)
-    even = (0.5 + np.outer(_ALPHAS, np.arange(_DRAWS))) % 1
     columns = [
-        axis.left[cell] + axis.cells[cell] * some for axis, cell, some in zip(found.axes, cells, even, strict=True)
+        axis.left[cell] + axis.cells[cell] * some for axis, cell, some in zip(found.axes, cells, _EVEN, strict=True)
     ]
     return np.stack(columns, axis=-1)
 
@@ -273,7 +274,9 @@ def _quarter(draws: FloatArray, shape: Shape) -> FloatArray:
 
 def _estimate(values: FloatArray, confidence: float, back: Callable[[FloatArray], FloatArray] = np.asarray) -> Credible:
     tail = (1 - confidence) / 2
-    low, middle, high = sorted(back(np.quantile(values, [tail, 0.5, 1 - tail])))
+    places = np.array([tail, 0.5, 1 - tail]) * (values.size - 1)
+    ordered = values[:1] if values.min() == values.max() else np.sort(values)
+    low, middle, high = sorted(back(np.interp(places, _PLACES[: ordered.size], ordered)))
     return Credible(
         median=float(middle), mean=float(back(values.mean(keepdims=True))[0]), low=float(low), high=float(high)
     )
@@ -294,12 +297,18 @@ def _where(levels: FloatArray, thresholds: FloatArray) -> tuple[ThresholdPlace, 
 
 
 def _at(draws: FloatArray, share: float, shape: Shape) -> FloatArray:
-    """The levels, on the fit's axis, at which F is a share, by bisection for every shape alike."""
+    """The levels, on the fit's axis, at which F is a share."""
+    return np.asarray(draws[:, 0] + draws[:, 1] * _widths_off(share, shape))
+
+
+@lru_cache(maxsize=64)
+def _widths_off(share: float, shape: Shape) -> float:
+    """So many widths from the threshold F is a share: by bisection for every shape alike."""
     low, high = -20.0, 20.0
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if share_felt(middle, 0.0, 1.0, shape) < share else (low, middle)
-    return np.asarray(draws[:, 0] + draws[:, 1] * (low + high) / 2)
+    return (low + high) / 2
 
 
 def _shares(draws: FloatArray, levels: FloatArray, shape: Shape) -> FloatArray:
@@ -310,7 +319,7 @@ def _shares(draws: FloatArray, levels: FloatArray, shape: Shape) -> FloatArray:
 
 def _goodness(counts: LevelCounts, draws: FloatArray) -> Goodness:
     """Posterior predictive: each draw's deviance from the data against that from data drawn from it (Gelman 1996)."""
-    some, stream = draws[::4], np.random.default_rng(1996)
+    some, stream = draws[::8], np.random.default_rng(1996)
     shares = np.clip(_shares(some, counts.levels, counts.shape), 1e-12, 1 - 1e-12)
     spread, drawn = some[:, 4:], shares
     if spread.max() > 0:

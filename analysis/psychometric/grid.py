@@ -7,6 +7,8 @@ drawn from Beta(ν p, ν (1 - p)) with ν = 1/η² - 1, η from 0 (binomial) to 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from math import prod
 
 import numpy as np
 from scipy.special import betaln, xlog1py, xlogy
@@ -15,12 +17,16 @@ from analysis.psychometric.priors import Priors
 from analysis.stats.arrays import FloatArray
 from experiments.design.procedures.psychometric import Shape, share_felt
 
-_NODES = 4096
-"""Shares at which a level's likelihood is tabulated, evenly in arcsin √p, where it is smooth: an error below 1e-5."""
+_NODES = 512
+"""Shares at which a level's likelihood is tabulated, evenly in arcsin √p, where it is smooth: an error below 1e-3."""
 _KEPT = 1e-5
 """What is left out on each side of a coarse marginal when the fine grid is laid."""
-_COARSE = (28, 24, 7, 7, 6)
-_FINE = (44, 36, 10, 10, 10)
+_COARSE = (18, 14, 5, 5, 5)
+_FINE = (26, 22, 7, 7, 8)
+"""Places of each axis. Twice on the coarse grid, so that a posterior much narrower than its cells is found as well."""
+_AT_ONCE = 30_000
+"""So many shares are worked out together."""
+_NO_SPREAD = 1e-7
 NAMES = ("threshold", "width", "lapse", "guess", "overdispersion")
 """The axes of a posterior, in order."""
 
@@ -48,8 +54,8 @@ class Posterior:
     def marginal(self, name: str) -> tuple[FloatArray, FloatArray]:
         """A parameter's values and their weights."""
         place = NAMES.index(name)
-        others = tuple(axis for axis in range(len(NAMES)) if axis != place)
-        return self.axes[place].values, self.weights.sum(axis=others)
+        before, after = prod(self.weights.shape[:place]), prod(self.weights.shape[place + 1 :])
+        return self.axes[place].values, self.weights.reshape(before, -1, after).sum(axis=2).sum(axis=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,9 +86,11 @@ def posterior(counts: LevelCounts, priors: Priors, fixed: dict[str, float]) -> P
         "overdispersion": (0.0, priors.overdispersion.most),
     }
     bounds |= {name: (value, value) for name, value in fixed.items()}
-    coarse = _on(counts, priors, tuple(map(_axis, NAMES, (bounds[name] for name in NAMES), _COARSE)))
-    narrowed = [_around(axis, coarse.marginal(name)[1]) for name, axis in zip(NAMES, coarse.axes, strict=True)]
-    return _on(counts, priors, tuple(map(_axis, NAMES, narrowed, _FINE)))
+    around = [bounds[name] for name in NAMES]
+    for sizes in (_COARSE, _COARSE):
+        coarse = _on(counts, priors, tuple(map(_axis, NAMES, around, sizes)))
+        around = [_around(axis, coarse.marginal(name)[1]) for name, axis in zip(NAMES, coarse.axes, strict=True)]
+    return _on(counts, priors, tuple(map(_axis, NAMES, around, _FINE)))
 
 
 def _axis(name: str, bounds: tuple[float, float], size: int) -> Axis:
@@ -93,8 +101,14 @@ def _axis(name: str, bounds: tuple[float, float], size: int) -> Axis:
     if name in ("threshold", "width"):
         cells = np.full(size, (high - low) / size)
         return Axis(low=low, high=high, values=low + cells * (np.arange(size) + 0.5), cells=cells)
-    nodes, weights = np.polynomial.legendre.leggauss(size)
+    nodes, weights = _nodes(size)
     return Axis(low=low, high=high, values=low + (high - low) * (nodes + 1) / 2, cells=(high - low) * weights / 2)
+
+
+@cache
+def _nodes(size: int) -> tuple[FloatArray, FloatArray]:
+    nodes, weights = np.polynomial.legendre.leggauss(size)
+    return nodes, weights
 
 
 def _around(axis: Axis, weights: FloatArray) -> tuple[float, float]:
@@ -123,9 +137,14 @@ def _log_likelihood(counts: LevelCounts, axes: tuple[Axis, ...]) -> FloatArray:
     thresholds, widths, lapses, guesses, spreads = (axis.values for axis in axes)
     total = np.zeros([axis.size for axis in (thresholds, widths, lapses, guesses, spreads)])
     slack = 1 - lapses[:, None] - guesses
-    for level, right, trials in zip(counts.levels, counts.right, counts.trials, strict=True):
-        felt = share_felt(level, thresholds[:, None], widths, counts.shape)
-        share = guesses + slack * felt[..., None, None]
+    felt = share_felt(counts.levels[:, None, None], thresholds[:, None], widths, counts.shape)[..., None, None]
+    if spreads.size == 1 and spreads[0] ** 2 < _NO_SPREAD:
+        few = max(1, _AT_ONCE // total.size)
+        for some in (slice(first, first + few) for first in range(0, len(felt), few)):
+            total[..., 0] += _binomial(guesses + slack * felt[some], counts.right[some], counts.trials[some])
+        return total
+    for level, right, trials in zip(felt, counts.right, counts.trials, strict=True):
+        share = guesses + slack * level
         at = np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0))) * ((_NODES - 1) / (np.pi / 2))
         below = np.minimum(at.astype(np.intp), _NODES - 2)
         above = at - below
@@ -135,11 +154,19 @@ def _log_likelihood(counts: LevelCounts, axes: tuple[Axis, ...]) -> FloatArray:
     return total
 
 
+def _binomial(share: FloatArray, right: FloatArray, trials: FloatArray) -> FloatArray:
+    """The log likelihood of all levels' answers: `share` of the shape (levels, ...), which is overwritten."""
+    np.clip(share, 1e-12, 1 - 1e-12, out=share)
+    flat = share.reshape(len(share), -1)
+    wrong = (trials - right) @ np.log(1 - flat)
+    return np.asarray(right @ np.log(flat, out=flat) + wrong).reshape(share.shape[1:])
+
+
 def _table(right: float, trials: float, spread: float) -> FloatArray:
     """The log likelihood of a level's answers by the share of right ones, from 0 to 1 in even steps of arcsin √p."""
     share = np.sin(np.linspace(0.0, np.pi / 2, _NODES)) ** 2
     share = np.clip(share, 1e-12, 1 - 1e-12)
-    if spread**2 < 1e-7:
+    if spread**2 < _NO_SPREAD:
         return np.asarray(xlogy(right, share) + xlog1py(trials - right, -share))
     drawn = 1 / spread**2 - 1
     a, b = drawn * share, drawn * (1 - share)
