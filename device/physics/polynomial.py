@@ -37,8 +37,11 @@ def lower_bound(c: Coefficients, sign: float) -> float:
     """A bound from below for what the polynomial, times `sign`, adds to its first coefficient on [0, 1]."""
     even, odd = 0.0, 0.0
     for j in range(1, ORDER, 2):
-        even += min(sign * c[j], 0.0)
-        odd += min(sign * c[j + 1], 0.0)
+        one, other = sign * c[j], sign * c[j + 1]
+        if not one >= 0.0:  # a number below 0, or none
+            even += one
+        if not other >= 0.0:
+            odd += other
     return even + odd
 
 
