@@ -73,6 +73,20 @@ def test_figure_5_is_written_as_png_svg_and_pdf_and_names_the_stages(tmp_path: P
 
 
 @pytest.mark.usefixtures("vectors_alone")
+def test_several_shots_have_letters_and_one_has_its_options(tmp_path: Path) -> None:
+    one = replace(shot_panel(), options="full model: " + " ".join(f"number_{n}_m=0.5" for n in range(12)))
+    alone, both = (
+        files_of(figure_5, panels, tmp_path / str(len(panels)))[1].read_text(encoding="utf-8")
+        for panels in ([one], [one, one])
+    )
+    assert "(a)" not in alone
+    assert all(f"number_{n}_m=0.5" in alone for n in range(12))
+    assert "(a)" in both
+    assert "(b)" in both
+    assert "number_" not in both
+
+
+@pytest.mark.usefixtures("vectors_alone")
 @pytest.mark.parametrize("landing_s", [0.15, np.nan])
 def test_a_shot_that_does_not_come_home_is_drawn_without_a_collision(landing_s: float, tmp_path: Path) -> None:
     _, svg, _ = files_of(figure_5, [shot_panel(np.nan if np.isnan(landing_s) else 1.0, landing_s)], tmp_path / "shot")

@@ -1,9 +1,11 @@
 """What `recoil simulate` tells beyond a shot's summary."""
 
 import json
+from dataclasses import fields
 
 import pytest
 
+from analysis.predict.simulate.panels import write_plot
 from device.physics import GunParameters, simulate
 from device.physics.hand import HandMechanics, compliant_collision, simulate_held
 from device.physics.traces import energy_balance
@@ -71,3 +73,12 @@ def test_what_cannot_be_told_is_refused(recoil, words, said):
     assert done.returncode == 2
     assert said in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_figure_of_a_shot_names_every_option_also_those_that_are_assumed(tmp_path):
+    with figure_files.drawn("svg"):
+        write_plot(GunParameters(drive_off="open", return_friction_N=1.12), tmp_path / "shot.png")
+    drawn = (tmp_path / "shot.svg").read_text(encoding="utf-8")
+    for words in ("coil open", "drive_off=open", "emf=printed", "contact_depth_m=0.0005"):
+        assert words in drawn
+    assert all(f"{one.name}=" in drawn for one in fields(GunParameters))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from device.vibration import Vibration, VibrationParameters, solved
 
 _COARSE_S = 0.0005  # steps above which a curve is drawn with corners
 _MOST_POINTS = 40_000
-_TITLE_WIDTH = 44
+_TITLE_WIDTH = 52
 
 
 def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
@@ -48,20 +48,23 @@ def _or_nan(value: float | None) -> float:
 
 
 def write_plot(parameters: GunParameters, path: Path) -> None:
-    """Figure 5's panels of the shot, as PNG and SVG beside each other."""
-    title = "\n".join(textwrap.wrap(_title(parameters), _TITLE_WIDTH))
-    figure_5([shot_panel(title, parameters)], path.with_suffix(""))
+    """Figure 5's panels of the shot by the full model, with all that it was made with; PNG, SVG and PDF."""
+    back_N = parameters.return_friction_N
+    friction = f"Friction {parameters.friction_N:g} N{'' if back_N is None else f' ({back_N:g} N on the way back)'}"
+    title = f"{friction}, coil {parameters.drive_off} after the pulse"
+    panel = shot_panel("\n".join(textwrap.wrap(title, _TITLE_WIDTH)), parameters)
+    figure_5([replace(panel, options=_options(parameters))], path.with_suffix(""))
 
 
-def _title(parameters: GunParameters) -> str:
-    """The friction, and every number that is not the paper's."""
-    own = (field.name for field in fields(parameters) if getattr(parameters, field.name) != field.default)
-    others = [f"{name} = {in_words(getattr(parameters, name))}" for name in own if name != "friction_N"]
-    return ", ".join([f"friction {parameters.friction_N:g} N", *others])
+def _options(parameters: GunParameters) -> str:
+    """Every parameter by the name that --set knows it by, also those that are the paper's or assumed."""
+    values = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
+    said = [f"{name}={in_words(value)}" for name, value in values.items() if value is not None]
+    return " ".join(("full model:", *said))
 
 
 def write_vibration_plot(parameters: VibrationParameters, path: Path) -> None:
-    """The vibration over time, as PNG and SVG beside each other."""
+    """The vibration over time, as PNG, SVG and PDF."""
     figure_vibration(_vibration_panel(parameters, solved(parameters)), path.with_suffix(""))
 
 

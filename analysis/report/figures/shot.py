@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ _WIDE = 200.0  # the longest shot in ends of its first stage, from which on time
 _PANEL_IN = 4.1
 _SHOWN_PT = 0.8 * 72.0 * _PANEL_IN  # of a panel's width, its axis
 _APART_PT = 17.0  # least distance of two stages' names
+_NAMES_PT = 44.0  # so much room their slanted names take
+_OPTIONS_WIDTH = 86
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +41,7 @@ class ShotPanel:
     collision_force_N: float
     contact_depth_m: float = 0.0005
     status: str = "home"
+    options: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +52,7 @@ class _Trace:
 
 
 def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> None:
-    """A column (a), (b), ... for each shot; rows F, x, dx/dt, u over time in ms; PNG, SVG and PDF are written.
+    """A column a shot, (a), (b), ... if several; rows F, x, dx/dt, u over time in ms; PNG, SVG and PDF are written.
 
     Stage borders are lines with open circles on the traces, at the values just before. The collision is an arrow at the
     end of the reset, cut at the top of the axis where it is larger. Where a stage would be too narrow to see, time is
@@ -59,7 +63,9 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> None:
     with drawn(path_stem, 0.8 + _PANEL_IN * len(panels), 7.4) as figure:
         grid = figure.subplots(4, len(panels), sharex=True, sharey="row", squeeze=False)
         for column, panel in enumerate(panels):
-            _draw_column(list(grid[:, column]), panel, chr(ord("a") + column))
+            _draw_column(list(grid[:, column]), panel)
+            letter, pad = (f"({chr(ord('a') + column)}) ", 54.0) if len(panels) > 1 else ("", _NAMES_PT)
+            grid[0, column].set_title(f"{letter}{panel.title}", loc="left", pad=pad, fontweight="bold")
         _scale_time(grid[0, 0], panels)
         for row, label in enumerate(trace.label for trace in _traces(panels[0])):
             grid[row, 0].set_ylabel(label)
@@ -68,6 +74,12 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> None:
             _name_stages(grid[0, column], panel)
             _draw_collision(grid[0, column], panel)
         figure.align_ylabels(grid[:, 0])
+        if len(panels) == 1 and panels[0].options:
+            figure.supxlabel(_in_lines(panels[0].options), x=0.02, ha="left", fontsize=6.5, linespacing=1.4)
+
+
+def _in_lines(options: str) -> str:
+    return "\n".join(textwrap.wrap(options, _OPTIONS_WIDTH, break_long_words=False, break_on_hyphens=False))
 
 
 def _traces(panel: ShotPanel) -> tuple[_Trace, ...]:
@@ -79,7 +91,7 @@ def _traces(panel: ShotPanel) -> tuple[_Trace, ...]:
     )
 
 
-def _draw_column(column: Sequence[Axes], panel: ShotPanel, letter: str) -> None:
+def _draw_column(column: Sequence[Axes], panel: ShotPanel) -> None:
     time_ms = panel.time_s * 1e3
     at_rest = abs(panel.velocity_m_s[-1]) < 1e-3  # so it stays until the longest shot ends
     for axes, trace in zip(column, _traces(panel), strict=True):
@@ -93,7 +105,6 @@ def _draw_column(column: Sequence[Axes], panel: ShotPanel, letter: str) -> None:
             axes.plot([end_ms], [height], "o", markersize=5.0, mfc="white", mec=BLACK, mew=1.0, zorder=4)
         if not np.ptp(trace.values):
             axes.set_ylim(trace.values[0] - 1.0, trace.values[0] + 1.0)
-    column[0].set_title(f"({letter}) {panel.title}", loc="left", pad=54.0, fontweight="bold")
     column[-1].set_xlabel("time [ms]")
 
 

@@ -206,8 +206,9 @@ def shot_picture(panels: tuple[ShotPanel, ...], *, compared: bool) -> Picture:
         f"simulated shot{as_there}. Dashed lines and circles: ends of the stages. Arrow: estimated force of the "
         "collision with the rear stop, apart from F."
     )
+    columns = [f"column {chr(ord('a') + i)}, " if len(panels) > 1 else "" for i in range(len(panels))]
     landings = "; ".join(
-        f"column {chr(ord('a') + i)}, {panel.title}: {_landing_words(panel)}" for i, panel in enumerate(panels)
+        f"{column}{panel.title}: {_landing_words(panel)}" for column, panel in zip(columns, panels, strict=True)
     )
     alt = f"Line charts of F, x, dx/dt and u over time, one column a friction. {landings}."
     return Picture(stem=_SHOT_FIGURE, caption=caption, alt=alt)
