@@ -17,8 +17,9 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import damper
 from experiments.screens.console import progress, view, widgets
-from experiments.screens.console.progress import RunTiming, clock_text, end_text, remaining_s, trials_done
+from experiments.screens.console.progress import trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
+from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Prepare, Present, Presented, Repeated, Rest
@@ -267,8 +268,8 @@ class Day:
 
     @property
     def left_s(self) -> float:
-        about = About(setup=self.setup, plan=self.plan)
-        return remaining_s(Seen(about=about, position=self.position, told=self.told, now_s=self.now_s), self.so_far)
+        so_far = {"told": self.told, "position": self.position, "now_s": self.now_s}
+        return remaining_s(Ahead(design=self.setup.config, plan=self.plan, **so_far), self.so_far)
 
 
 @given(durations=st.lists(st.floats(1, 300), min_size=1, max_size=6))

@@ -13,6 +13,7 @@ from experiments.screens.console import progress, widgets
 from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import field_at
 from experiments.screens.console.view import About, Instruction, Seen
+from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.states import Position, State
 from experiments.session.steps import Asking, Rate
 
@@ -234,7 +235,7 @@ class SidePanel(QtWidgets.QWidget):
         for lines in (self._coming, self._answers):
             lines.setMinimumHeight(1)
 
-    def put(self, seen: Seen, timing: progress.RunTiming) -> None:
+    def put(self, seen: Seen, timing: RunTiming) -> None:
         """Show what is so now."""
         for label, (text, mood) in (
             (self._gun, progress.gun_text(seen.gun)),
@@ -267,11 +268,13 @@ class Bars(QtWidgets.QWidget):
             bar.setValue(one.count)
 
 
-def _times(seen: Seen, timing: progress.RunTiming) -> str:
-    elapsed = f"Elapsed {progress.clock_text(timing.elapsed_s(seen.now_s))}"
+def _times(seen: Seen, timing: RunTiming) -> str:
+    elapsed = f"Elapsed {clock_text(timing.elapsed_s(seen.now_s))}"
     if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed
-    return f"{elapsed}\nEnds {progress.end_text(progress.remaining_s(seen, timing), datetime.now())}"
+    about = seen.about
+    ahead = Ahead(design=about.setup.config, plan=about.plan, told=seen.told, position=seen.position, now_s=seen.now_s)
+    return f"{elapsed}\nEnds {end_text(remaining_s(ahead, timing), datetime.now())}"
 
 
 def _fill(shown: QtWidgets.QListWidget, lines: list[str]) -> None:

@@ -1,11 +1,9 @@
-"""How far a run is, and when it will end: from the plan, and ever more from the trials that were measured."""
+"""How far a run is, and what comes next, as the console says it."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
-from datetime import datetime, timedelta
-from itertools import pairwise
+from dataclasses import dataclass
 
 from device import GunStatus
 from experiments.design.plan import Trial
@@ -13,16 +11,11 @@ from experiments.design.stimuli import settings
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import steps
+from experiments.session.duration import break_s
 from experiments.session.history import History, answered, done, entries, of_one_set
 from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
-from experiments.session.states import Position, State
+from experiments.session.states import State
 from experiments.session.steps import Outcome, Step
-
-PRIOR_TRIALS = 5
-"""The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""
-
-ROUGH_S = 1200.0
-"""With more than this still to go, the end is told to five minutes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,89 +42,6 @@ def trials_done(seen: Seen) -> list[TrialCount]:
 
 def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:
     return TrialCount(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
-
-
-@dataclass(slots=True)
-class RunTiming:
-    """Measures how long trials take, without the time of pauses."""
-
-    began_s: float | None = None
-    measured_s: list[float] = field(default_factory=list)
-    _trial_s: float | None = None
-    _paused_s: float = 0.0
-    _pause_began_s: float | None = None
-
-    def at(self, position: Position, now_s: float) -> None:
-        """Take a new position."""
-        if self.began_s is None and position.step is not None:
-            self.began_s = now_s
-        if position.state in (State.SETTING, State.PREPARING) and self._trial_s is None:
-            self._trial_s, self._paused_s = now_s, 0.0
-        if position.paused_s is not None:
-            self._pause_began_s = position.paused_s
-        elif self._pause_began_s is not None:
-            self._paused_s += now_s - self._pause_began_s
-            self._pause_began_s = None
-
-    def saved(self, word: Outcome | Remark, now_s: float) -> None:
-        """Take what was saved: a trial is over with its answer, or with its stimulus where answers come at the end."""
-        if isinstance(word, steps.Answered | steps.Presented) and self._trial_s is not None:
-            self.measured_s.append(now_s - self._trial_s - self._paused_s)
-        if isinstance(word, steps.Answered | steps.Presented | steps.Rested):
-            self._trial_s = None
-
-    def elapsed_s(self, now_s: float) -> float:
-        """How long the run has been under way; 0 before it begins."""
-        return 0.0 if self.began_s is None else now_s - self.began_s
-
-    def trial_s(self, planned_s: float) -> float:
-        """How long a trial takes: the mean of those measured and of `PRIOR_TRIALS` as planned."""
-        return (PRIOR_TRIALS * planned_s + sum(self.measured_s)) / (PRIOR_TRIALS + len(self.measured_s))
-
-
-def remaining_s(seen: Seen, progress: RunTiming) -> float:
-    """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
-    config, planned = seen.about.setup.config, len(seen.about.plan.trials)
-    left = planned - len(done(seen.told))
-    ratings_s = max(0, planned - len(answered(seen.told))) * config.rating_s
-    return float(left * progress.trial_s(config.trial_s) + _breaks_left_s(seen) + ratings_s)
-
-
-def _breaks_left_s(seen: Seen) -> float:
-    position = seen.position
-    taken_s = sum(
-        step.duration_s for step, word in seen.told if isinstance(step, steps.Rest) and isinstance(word, steps.Rested)
-    )
-    trials = seen.about.plan.trials
-    left_s = sum(_break_s(seen.about, before, trial) for before, trial in pairwise(trials)) - taken_s
-    if position.base is State.RESTING and position.until_s is not None and isinstance(position.step, steps.Rest):
-        since_s = seen.now_s if position.paused_s is None else position.paused_s
-        left_s -= position.step.duration_s - max(0.0, position.until_s - since_s)
-    return max(0.0, left_s)
-
-
-def end_text(left_s: float, now: datetime) -> str:
-    """When a run ends, as a time of day: to five minutes if it is far.
-
-    >>> end_text(3000.0, datetime(2026, 11, 22, 13, 43, 20)), end_text(300.0, datetime(2026, 11, 22, 13, 43, 20))
-    ('about 14:35', 'about 13:48')
-    """
-    end, grain_s = now + timedelta(seconds=left_s), 300 if left_s > ROUGH_S else 60
-    midnight = end.replace(hour=0, minute=0, second=0, microsecond=0)
-    grains = round((end - midnight).total_seconds() / grain_s)
-    return f"about {midnight + timedelta(seconds=grains * grain_s):%H:%M}"
-
-
-def clock_text(seconds: float) -> str:
-    """Minutes and seconds, hours where there are some.
-
-    >>> clock_text(75), clock_text(3725)
-    ('1:15', '1:02:05')
-    """
-    whole = max(0, round(seconds))
-    minutes, rest = divmod(whole, 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
 STRIP = 40
@@ -179,16 +89,8 @@ def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
 
 
 def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
-    seconds = _break_s(about, before, trial)
+    seconds = break_s(about.setup.config, before, trial)
     return [f"break of {texts.duration_text(seconds)}"] if seconds else []
-
-
-def _break_s(about: About, before: Trial, trial: Trial) -> float:
-    """How long the break between two trials is; 0 without one."""
-    breaks = about.setup.config.breaks
-    if (before.session, before.set) == (trial.session, trial.set):
-        return 0.0
-    return float(breaks.between_sets_s if before.session == trial.session else breaks.between_sessions_s)
 
 
 def answer_lines(seen: Seen) -> list[str]:

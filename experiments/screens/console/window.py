@@ -16,10 +16,11 @@ from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
-from experiments.screens.console.progress import RunTiming, marks
+from experiments.screens.console.progress import marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
+from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.remarks import Halted
 from experiments.session.states import Position
