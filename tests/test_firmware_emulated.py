@@ -34,7 +34,7 @@ def test_the_chip_in_real_time_says_and_does_what_the_twin_does_for_the_same_cal
 
 
 def test_it_says_who_it_is(hand):
-    assert hand.ask("*IDN?") == "Recoil,haptic-gun,QEMU-1,wire 1 firmware 1.0.0"
+    assert hand.ask("*IDN?") == "Recoil,haptic-gun,QEMU-1,wire 1 firmware 1.1.0"
 
 
 def test_its_clock_goes_as_the_worlds(hand):

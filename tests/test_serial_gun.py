@@ -31,7 +31,7 @@ def slow_pair(tmp_path):
 
 def test_it_is_born_disarmed_and_says_who_it_is(pair):
     identity = pair.gun.identify()
-    assert (identity.model, identity.serial, identity.version) == ("haptic-gun", "TWIN-1", "1.0.0")
+    assert (identity.model, identity.serial, identity.version) == ("haptic-gun", "TWIN-1", "1.1.0")
     status = pair.gun.status()
     assert (status.state, status.shots, status.fault) == ("disarmed", 0, None)
     assert status.coil_temperature_C == AMBIENT_C

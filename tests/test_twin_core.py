@@ -25,7 +25,7 @@ def strict():
 def test_it_boots_disarmed_plain_and_silent():
     hand = Hand()
     assert hand.say("") == []
-    assert hand.say("*IDN?\r") == ["Recoil,haptic-gun,TWIN-1,wire 1 firmware 1.0.0"]
+    assert hand.say("*IDN?\r") == ["Recoil,haptic-gun,TWIN-1,wire 1 firmware 1.1.0"]
     assert hand.standing().state == "DISARMED"
     assert (hand.error(), hand.say("TRIG"), hand.error()) == ('0,"No error"', [], '101,"Disarmed"')
 

@@ -64,4 +64,4 @@ def test_whatever_bytes_come_the_core_answers_in_bounds_and_still_knows_its_name
         out, _ = gun.core.step(data, now_us)
         assert len(out) <= (MAX_LINE + 1) * (data.count(b"\n") + 1)
     out, _ = gun.core.step(b"\n*IDN?\n", now_us)
-    assert out.endswith(b"Recoil,haptic-gun,TWIN-1,wire 1 firmware 1.0.0\n")
+    assert out.endswith(b"Recoil,haptic-gun,TWIN-1,wire 1 firmware 1.1.0\n")

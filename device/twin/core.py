@@ -17,10 +17,23 @@ WATCHDOG_MS: Final = 30_000
 """At boot, for a hand at a terminal; `SerialGun` asks for a shorter one."""
 MIN_WATCHDOG_MS, MAX_WATCHDOG_MS = 100, 60_000
 
-IDENTITY: Final = records.Named(model="haptic-gun", serial="TWIN-1", wire=records.WIRE_VERSION, firmware="1.0.0")
+IDENTITY: Final = records.Named(model="haptic-gun", serial="TWIN-1", wire=records.WIRE_VERSION, firmware="1.1.0")
 
 Said = str | int | None
 """What a command comes to: an answer, an error's number, or nothing to say but that it is done."""
+
+SCPI_VERSION: Final = "1999.0"
+COMPLETE, DEVICE_ERROR, EXECUTION_ERROR, COMMAND_ERROR, POWER_ON = 1, 8, 16, 32, 128
+"""The bits of the standard event status register (IEEE 488.2, 11.5.1) that a gun sets."""
+
+
+def event_of(error: int) -> int:
+    """The bit of an error by its number: -1xx a command's, -2xx its execution's, all others the device's.
+
+    >>> event_of(WireError.UNDEFINED), event_of(WireError.OUT_OF_RANGE), event_of(WireError.WATCHDOG)
+    (32, 16, 8)
+    """
+    return {1: COMMAND_ERROR, 2: EXECUTION_ERROR}.get(-error // 100, DEVICE_ERROR)
 
 
 class Core:
@@ -34,6 +47,10 @@ class Core:
         self._identity = identity
         self._splitter = records.Splitter()
         self.errors: list[int] = []
+        self._events = POWER_ON
+        self._tells_complete = False  # *OPC waits for the end of the shot
+        self._asked_complete: int | None = None  # sequence number of the *OPC? that does, 0 in the plain mode
+        self._number = 0  # of the frame that is being carried out, 0 in the plain mode
         self._out = bytearray()
         self._last = 0  # sequence number
         self._token = 0
@@ -92,6 +109,7 @@ class Core:
         elif line is None:
             self._queue(WireError.OVERRUN)
         else:
+            self._number = 0
             said = self._do(_text(line), now_us)
             self.heard_us = self.heard_us if isinstance(said, int) else now_us
             self._say(said)
@@ -120,7 +138,7 @@ class Core:
         except records.Garbled:
             self._send(frame.number, f"ERR {message(WireError.BAD_TYPE)}")
             return
-        self._pending = 0
+        self._pending, self._asked_complete = 0, None
         self._abort(now_us)
         self._send(frame.number, f"STRI {self._token}")
         self.strict, self._token, self._last, self.heard_us = True, token, frame.number, now_us
@@ -131,12 +149,13 @@ class Core:
             self._send(frame.number, "OK")
             self.strict = False
             return
+        self._number = frame.number
         said = self._do(frame.body, now_us)
         if isinstance(said, int):
             self._send(frame.number, f"ERR {message(said)}")
         elif frame.body.startswith("TRIG"):
             self._pending = frame.number
-        else:
+        elif self._asked_complete != frame.number:
             self._send(frame.number, said or "OK")
 
     def _answer_ended(self) -> None:
@@ -146,11 +165,17 @@ class Core:
         self._answer_trigger()
 
     def _answer_trigger(self) -> None:
-        """Tell what became of the shot that waits for its answer."""
+        """A shot has ended: tell what became of it, and that it has."""
         if self._pending:
             ended = self.machine.shot.ending != "NONE"
             self._send(self._pending, self.machine.shot.text() if ended else f"ERR {message(self.machine.never)}")
         self._pending = 0
+        self._events |= COMPLETE if self._tells_complete else 0
+        asked, self._tells_complete, self._asked_complete = self._asked_complete, False, None
+        if asked == 0:
+            self._say("1")
+        elif asked is not None:
+            self._send(asked, "1")
 
     def _do(self, text: str, now_us: int) -> Said:
         """Carry a command out: header, blank, parameters."""
@@ -176,9 +201,25 @@ class Core:
                 return None
             case "*CLS":
                 self.errors.clear()
+                self._events, self._tells_complete = 0, False
                 return None
+            case "*OPC":
+                self._tells_complete = self.machine.due_us() is not None
+                self._events |= 0 if self._tells_complete else COMPLETE
+                return None
+            case "*OPC?":
+                return self._ask_complete()
             case _:
                 return self._question(header, now_us)
+
+    def _ask_complete(self) -> Said:
+        """1, at once or when the shot that waits or is driven has ended. One question waits at a time."""
+        if self.machine.due_us() is None:
+            return "1"
+        if self._asked_complete is not None:
+            return WireError.BUSY
+        self._asked_complete = self._number
+        return None
 
     def _question(self, header: str, now_us: int) -> Said:
         match header:
@@ -195,6 +236,18 @@ class Core:
                 return WireError.NOT_CONFIGURED if setting is None else f"CONF {setting.text()}"
             case "SYST:WATC?":
                 return f"WATC {self._watchdog_us // 1000}"
+            case _:
+                return self._say_of_itself(header, now_us)
+
+    def _say_of_itself(self, header: str, now_us: int) -> Said:
+        match header:
+            case "*TST?":
+                return f"{self.machine.standing(now_us).fault}"
+            case "*ESR?":
+                events, self._events = self._events, 0
+                return f"{events}"
+            case "SYST:VERS?":
+                return SCPI_VERSION
             case _:
                 return message(self.errors.pop(0) if self.errors else WireError.NO_DEVICE_ERROR)
 
@@ -230,14 +283,19 @@ class Core:
         self._out.extend(records.encode(records.Frame(number=sequence, body=body), "gun"))
 
     def _queue(self, error: int) -> None:
+        self._events |= event_of(error)
         if len(self.errors) < QUEUE_SIZE:
             self.errors.append(error)
         else:
             self.errors[-1] = WireError.QUEUE_OVERFLOW
+            self._events |= event_of(WireError.QUEUE_OVERFLOW)
 
 
 _WITHOUT: Final = frozenset(
-    ("ARM", "ABOR", "*RST", "*CLS", "*IDN?", "TIME?", "STAT?", "SHOT?", "CONF?", "SYST:WATC?", "SYST:ERR?")
+    (
+        *("ARM", "ABOR", "*RST", "*CLS", "*OPC", "*OPC?", "*IDN?", "*TST?", "*ESR?", "TIME?", "STAT?", "SHOT?"),
+        *("CONF?", "SYST:WATC?", "SYST:ERR?", "SYST:VERS?"),
+    )
 )
 _WITH: Final = frozenset(("CONF", "TRIG", "SYST:WATC"))
 

@@ -43,6 +43,61 @@ static enum error clear_errors(struct core *core, const struct parameters *param
 {
     (void)parameters, (void)now_us;
     core->error_count = 0;
+    core->events = 0;
+    core->tells_complete = false;
+    return ERROR_NONE;
+}
+
+static bool shot_is_on(const struct core *core)
+{
+    uint64_t due_us;
+    return machine_due(&core->machine, &due_us);
+}
+
+static enum error tell_complete(struct core *core, const struct parameters *parameters, uint64_t now_us)
+{
+    (void)parameters, (void)now_us;
+    core->tells_complete = shot_is_on(core);
+    if (!core->tells_complete)
+        core->events |= EVENT_COMPLETE;
+    return ERROR_NONE;
+}
+
+/* 1, at once or when the shot that waits or is driven has ended. One question waits at a time. */
+static enum error ask_complete(struct core *core, const struct parameters *parameters, uint64_t now_us)
+{
+    (void)parameters, (void)now_us;
+    if (!shot_is_on(core)) {
+        text_add(&core->answer, "1");
+        return ERROR_NONE;
+    }
+    if (core->asks_complete)
+        return ERROR_BUSY;
+    core->asks_complete = true;
+    core->asked_complete = core->number;
+    return ERROR_NONE;
+}
+
+static enum error tell_events(struct core *core, const struct parameters *parameters, uint64_t now_us)
+{
+    (void)parameters, (void)now_us;
+    text_number(&core->answer, core->events);
+    core->events = 0;
+    return ERROR_NONE;
+}
+
+/* Nothing is driven for it: what is known of the driver. */
+static enum error test_itself(struct core *core, const struct parameters *parameters, uint64_t now_us)
+{
+    (void)parameters;
+    text_number(&core->answer, machine_standing(&core->machine, now_us).fault);
+    return ERROR_NONE;
+}
+
+static enum error tell_version(struct core *core, const struct parameters *parameters, uint64_t now_us)
+{
+    (void)parameters, (void)now_us;
+    text_add(&core->answer, "1999.0");
     return ERROR_NONE;
 }
 
@@ -147,6 +202,10 @@ static const struct command COMMANDS[] = {
     {"*IDN?", identify, TAKES_NONE},
     {"*RST", reset, TAKES_NONE},
     {"*CLS", clear_errors, TAKES_NONE},
+    {"*OPC", tell_complete, TAKES_NONE},
+    {"*OPC?", ask_complete, TAKES_NONE},
+    {"*ESR?", tell_events, TAKES_NONE},
+    {"*TST?", test_itself, TAKES_NONE},
     {"ABOR", abort_shot, TAKES_NONE},
     {"ARM", arm, TAKES_NONE},
     {"CONF", configure, TAKES_WORDS},
@@ -158,6 +217,7 @@ static const struct command COMMANDS[] = {
     {"SYST:WATC", set_watchdog, TAKES_NUMBERS},
     {"SYST:WATC?", tell_watchdog, TAKES_NONE},
     {"SYST:ERR?", tell_error, TAKES_NONE},
+    {"SYST:VERS?", tell_version, TAKES_NONE},
 };
 
 static const struct command *find(struct slice header)

@@ -39,19 +39,18 @@ static void send_plain(struct core *core)
 
 static void queue(struct core *core, enum error error)
 {
-    if (core->error_count < QUEUE_SIZE)
+    core->events |= error_event(error);
+    if (core->error_count < QUEUE_SIZE) {
         core->errors[core->error_count++] = error;
-    else
-        core->errors[QUEUE_SIZE - 1] = ERROR_QUEUE_OVERFLOW;
+        return;
+    }
+    core->errors[QUEUE_SIZE - 1] = ERROR_QUEUE_OVERFLOW;
+    core->events |= error_event(ERROR_QUEUE_OVERFLOW);
 }
 
-/* Tells what became of the shot that waits for its answer. */
-static void answer_trigger(struct core *core)
+/* Tells what became of the shot, to the trigger that waits for it. */
+static void answer_shot(struct core *core, uint16_t number)
 {
-    uint16_t number = core->pending;
-    core->pending = 0;
-    if (number == 0)
-        return;
     if (core->machine.shot.ending == ENDING_NONE) {
         send_error(core, number, core->machine.never);
         return;
@@ -59,6 +58,32 @@ static void answer_trigger(struct core *core)
     text_clear(&core->answer);
     shot_text(&core->machine.shot, &core->answer);
     send_frame(core, number, written(&core->answer));
+}
+
+static void answer_complete(struct core *core)
+{
+    if (core->tells_complete)
+        core->events |= EVENT_COMPLETE;
+    core->tells_complete = false;
+    if (!core->asks_complete)
+        return;
+    core->asks_complete = false;
+    text_clear(&core->answer);
+    text_add(&core->answer, "1");
+    if (core->asked_complete == 0)
+        send_plain(core);
+    else
+        send_frame(core, core->asked_complete, written(&core->answer));
+}
+
+/* A shot has ended: tells what became of it, and that it has. */
+static void answer_trigger(struct core *core)
+{
+    uint16_t number = core->pending;
+    core->pending = 0;
+    if (number != 0)
+        answer_shot(core, number);
+    answer_complete(core);
 }
 
 /* A shot's time has come and is over; what kept it from being begun is queued in the plain mode. */
@@ -122,6 +147,7 @@ static void enter(struct core *core, const struct frame *frame, struct slice wor
         return;
     }
     core->pending = 0;
+    core->asks_complete = false;
     core_abort(core, now_us);
     text_add(&core->answer, "STRI ");
     text_number(&core->answer, core->token);
@@ -145,12 +171,13 @@ static void answer(struct core *core, const struct frame *frame, uint64_t now_us
         leave(core, frame->number, now_us);
         return;
     }
+    core->number = frame->number;
     enum error error = command_do(core, frame->body, now_us);
     if (error != ERROR_NONE)
         send_error(core, frame->number, error);
     else if (slice_starts(frame->body, "TRIG"))
         core->pending = frame->number;
-    else
+    else if (!core->asks_complete || core->asked_complete != frame->number)
         send_frame(core, frame->number, core->answer.length > 0 ? written(&core->answer) : words_of("OK"));
 }
 
@@ -182,6 +209,7 @@ static void take_garbled(struct core *core, struct slice line)
 /* In the plain mode questions are answered, errors queued, and everything else is silent. */
 static void take_plain(struct core *core, struct slice line, uint64_t now_us)
 {
+    core->number = 0;
     enum error error = slice_printable(line) ? command_do(core, line, now_us) : ERROR_UNDEFINED;
     if (error != ERROR_NONE) {
         queue(core, error);
@@ -210,6 +238,7 @@ static void take(struct core *core, enum heard heard, struct slice line, uint64_
 void core_boot(struct core *core, const char *serial, struct outlet outlet, uint64_t now_us)
 {
     *core = (struct core){.serial = serial, .outlet = outlet, .heard_us = now_us, .watchdog_us = BOOT_WATCHDOG_US};
+    core->events = EVENT_POWER_ON;
     machine_boot(&core->machine, (struct driver){outlet.owner, outlet.drive}, now_us);
 }
 

@@ -28,6 +28,11 @@ struct core {
     bool strict;
     uint16_t last;    /* sequence number taken */
     uint16_t pending; /* of the trigger that waits for its answer, 0 if none does */
+    uint16_t number;  /* of the frame that is being carried out, 0 in the plain mode */
+    uint8_t events;   /* the standard event status register */
+    bool tells_complete;      /* *OPC waits for the end of the shot */
+    bool asks_complete;       /* *OPC? does, by this number */
+    uint16_t asked_complete;
     uint64_t token, heard_us, watchdog_us;
 };
 

@@ -28,3 +28,10 @@ const char *error_message(enum error error)
     }
     return "0,\"No error\"";
 }
+
+uint8_t error_event(enum error error)
+{
+    if (error <= -100 && error > -200)
+        return EVENT_COMMAND_ERROR;
+    return error <= -200 && error > -300 ? EVENT_EXECUTION_ERROR : EVENT_DEVICE_ERROR;
+}

@@ -2,6 +2,8 @@
 #ifndef RECOIL_ERRORS_H
 #define RECOIL_ERRORS_H
 
+#include <stdint.h>
+
 enum error {
     ERROR_NONE = 0,
     ERROR_BAD_TYPE = -104,
@@ -29,5 +31,17 @@ enum error {
 
 /* An error as it stands on the wire: 101,"Disarmed" */
 const char *error_message(enum error error);
+
+/* The bits of the standard event status register (IEEE 488.2, 11.5.1) that a gun sets. */
+enum {
+    EVENT_COMPLETE = 1,
+    EVENT_DEVICE_ERROR = 8,
+    EVENT_EXECUTION_ERROR = 16,
+    EVENT_COMMAND_ERROR = 32,
+    EVENT_POWER_ON = 128,
+};
+
+/* The bit of an error by its number: -1xx a command's, -2xx its execution's, all others the device's. */
+uint8_t error_event(enum error error);
 
 #endif

@@ -5,7 +5,7 @@
 #include "text.h"
 
 #define RECOIL_WIRE_VERSION "1"
-#define RECOIL_FIRMWARE "1.0.0"
+#define RECOIL_FIRMWARE "1.1.0"
 
 enum { MAX_METHOD = 24 };
 
