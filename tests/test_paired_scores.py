@@ -143,7 +143,7 @@ def test_of_two_items_the_sandwich_is_that_of_a_mean_of_shares() -> None:
 
 @pytest.mark.parametrize("model", MODELS)
 def test_scores_and_errors_are_those_of_r(model: PairModel) -> None:
-    """`glm` with a logit or probit. Its errors are by the expected information, which is the observed one of a logit."""
+    """`glm` with a logit or probit. Its errors are by the expected information, of a logit the observed one."""
     by_r = json.loads((Path(__file__).parent / "golden" / "r" / "pairs_expected.json").read_text())["cases"]
     for ours, theirs in list(zip(GOLDEN, by_r, strict=True))[12:18]:
         found = paired_scores(range(len(ours["wins"])), ours["wins"], model=model)
