@@ -122,6 +122,7 @@ def psychometric_fit(
     shape: Shape = "normal",
     log: bool = False,
     falling: bool = False,
+    span: tuple[float, float] | None = None,
     priors: Priors | None = None,
     confidence: float = 0.95,
 ) -> PsychometricFit:
@@ -129,7 +130,8 @@ def psychometric_fit(
 
     `guess` is chance where the design knows it (1/2, 1/3), and `None` where it is fitted, as for yes or no; `lapse`
     likewise. `catch`: yes answers and trials without a stimulus, whose share is g. `overdispersed` fits how much more
-    than binomially answers vary. With `log`, F is of ln x; `falling`: F falls with x.
+    than binomially answers vary. With `log`, F is of ln x; `falling`: F falls with x. `span`: the lowest and
+    highest level that could have been met, as by an adaptive rule; those with trials unless given.
     `ValueError`: fewer than two different levels, counts that are none, levels that have no logarithm.
     Sources: Wichmann and Hill 2001, Percept. Psychophys. 63, 1293; Schütt and others 2016, Vision Res. 122, 105.
 
@@ -148,8 +150,16 @@ def psychometric_fit(
         raise ValueError(f"priors must be Priors or None, not {in_brief(priors)}")
     used = _with_catch(counts, catch)
     draws = _draws(posterior(used, priors or default_priors(counts.levels), fixed))
-    where, reason = _where(axis.back(counts.levels), axis.back(draws[:, 0]))
+    met = axis.back(counts.levels) if span is None else _span(span)
+    where, reason = _where(met, axis.back(draws[:, 0]))
     return _fit(used, draws, axis, where=where, reason=reason, confidence=level)
+
+
+def _span(given: ArrayLike) -> FloatArray:
+    found = numbers(given, "span")
+    if found.shape != (2,) or not found[0] < found[1]:
+        raise ValueError(f"span must be the lowest and the highest level, not {in_brief(given)}")
+    return found
 
 
 def _rate(value: ArrayLike, name: str) -> float:

@@ -71,8 +71,10 @@ class ThresholdDifference:
     difference: Credible
 
 
-def person_fit(answers: PersonFit, *, guess: float | None, falling: bool, priors: Priors) -> PersonFit:
-    """The answers with their function, or with the reason why there is none."""
+def person_fit(
+    answers: PersonFit, *, guess: float | None, falling: bool, span: tuple[float, float], priors: Priors
+) -> PersonFit:
+    """The answers with their function, or with the reason why there is none; `span` as in `psychometric_fit`."""
     if answers.trials < FEWEST_ANSWERS or len(answers.points) < 2:
         counted = f"{answers.trials} trials at {len(answers.points)} level{'' if len(answers.points) == 1 else 's'}"
         return replace(answers, reason=f"{counted}; a fit needs at least {FEWEST_ANSWERS} at two levels")
@@ -83,6 +85,7 @@ def person_fit(answers: PersonFit, *, guess: float | None, falling: bool, priors
         guess=guess,
         catch=answers.catch or (0, 0),
         falling=falling,
+        span=span,
         priors=priors,
     )
     return replace(answers, fit=fit, reason=fit.reason)

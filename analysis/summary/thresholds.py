@@ -87,7 +87,7 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     `everybody`: all people are fitted, however many, not some spread evenly over their codes.
     """
     question, factor = design.questions[name], numeric_factor(design)
-    share = None if factor is None else _share(design, question)
+    share = None if factor is None else fitted_share(design, question)
     if factor is None or share is None:
         return None
     known = chance(question) if share == "right" else None
@@ -113,7 +113,7 @@ def _numbers(levels: Sequence[Level]) -> list[float]:
     return [level for level in levels if not isinstance(level, str)]
 
 
-def _share(design: DesignConfig, question: QuestionConfig) -> FittedShare | None:
+def fitted_share(design: DesignConfig, question: QuestionConfig) -> FittedShare | None:
     """What is counted of a question's answers; `None` where nothing is a success."""
     if question.when == "block" or design.trial.kind == "pair":
         return None
@@ -219,9 +219,9 @@ def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresho
         return replace(found, people=len(codes), reason="the answers are all at one level")
     falling = found.share != "chosen" and _falls(levels, rows["success"].to_numpy(dtype=np.float64))
     priors = default_priors(-levels if falling else levels)
-    conditions = []
+    span, conditions = (float(levels.min()), float(levels.max())), []
     for of, people in answers.of_people(chosen):
-        fits = [person_fit(one, guess=found.guess, falling=falling, priors=priors) for one in people]
+        fits = [person_fit(one, guess=found.guess, falling=falling, span=span, priors=priors) for one in people]
         whole, group = with_group(fits)
         conditions.append(ConditionFit(levels=of, points=pooled[tuple(of.items())], people=whole, group=group))
     return replace(

@@ -21,7 +21,12 @@ MethodsOption = Annotated[
 EffectOption = Annotated[
     str | None, typer.Option(metavar="FACTOR,FACTOR", help="Factors on what people feel; 1 is the config.")
 ]
-SimulatedOption = Annotated[int, typer.Option(min=1, max=10_000_000, help="Simulated studies of each design.")]
+SimulatedOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1, max=10_000_000, help="Simulated studies of each design (10,000), or people for a threshold (200)."
+    ),
+]
 NullOption = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
 SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
 
@@ -33,7 +38,7 @@ def power(
     trials: TrialsListOption = None,
     methods: MethodsOption = None,
     effect: EffectOption = None,
-    studies: SimulatedOption = 10_000,
+    studies: SimulatedOption = None,
     target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
     null: NullOption = False,
     seed: terminal.FixedSeedOption = 1,
@@ -43,16 +48,27 @@ def power(
     out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
     as_json: terminal.AsJsonOption = False,
 ) -> None:
-    """Simulated power and precision: how many people and trials does it take, and what does it cost?"""
-    from analysis.predict.power import run as feature
+    """Simulated power and precision: how many people and trials does it take, and what does it cost?
 
+    Of a design with a threshold: by procedure and trials, how well it would be known.
+    """
+    from analysis.predict.power import run as feature
+    from analysis.predict.threshold_plan.run import procedures_of
+
+    if procedures_of(config):
+        others = {"--participants": participants, "--methods": methods, "--effect": effect, "--null": null}
+        elsewhere = {"--scheduler": scheduler, "--workers": workers}
+        _of_threshold(
+            config, trials, studies, seed, out, as_json, [name for name, one in {**others, **elsewhere}.items() if one]
+        )
+        return
     request = feature.PowerRequest(
         config=config,
         participants=participants,
         trials=trials,
         methods=tuple(methods or ()),
         effects=effect,
-        studies=studies,
+        studies=studies or 10_000,
         target=target,
         null=null,
         seed=seed,
@@ -60,6 +76,22 @@ def power(
     )
     found = feature.power(request, out, terminal.progress, workers, scheduler)
     terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+
+
+def _of_threshold(
+    config: str, trials: str | None, people: int | None, seed: int, out: Path, as_json: bool, unused: list[str]
+) -> None:
+    from analysis.predict.threshold_plan import page
+    from analysis.predict.threshold_plan.run import OBSERVERS, TRACK_TRIALS, ThresholdRequest
+    from experiments.config.door import ConfigError
+
+    if unused:
+        raise ConfigError(
+            f"{', '.join(unused)}: {config} has a threshold, of which only --trials and --studies are asked"
+        )
+    request = ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, observers=people or OBSERVERS, seed=seed)
+    found = page.threshold_plan(request, out, terminal.progress)
+    terminal.show(found, f"{terminal.in_text(page.plan_in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
 ConfigOrGunArgument = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
