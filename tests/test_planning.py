@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from experiments.config.door import ConfigError
 from experiments.design.config import DesignConfig
+from experiments.design.contents import cells
 from experiments.design.plan import Plan
-from experiments.design.planning import cells, groups, plan_of, square_size
+from experiments.design.planning import groups, plan_of, square_size
 from tests.designs import design
 
 WAYS = {"levels": ["forward", "backward"]}

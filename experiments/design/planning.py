@@ -8,34 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import replace
 
 from experiments.config.door import ConfigError, Order
 from experiments.design.config import DesignConfig
-from experiments.design.language import INSTRUCTION_FACTOR, MAX_TRIALS, BlockOrder, Level, shown_level
+from experiments.design.contents import Content, Streams, cells, in_order, session_cells, trial_contents
+from experiments.design.language import INSTRUCTION_FACTOR, BlockOrder, Level, shown_level
 from experiments.design.plan import Condition, Plan, Trial, square_rows
 from experiments.design.streams import Stream
-
-
-def cells(design: DesignConfig, names: Sequence[str], given: Condition = ()) -> list[Condition]:
-    """Every combination of the factors' levels, nested ones by the level that they are nested in.
-
-    `given` are levels that hold already; a factor that is nested in one of them has the levels that it has there.
-    """
-    found: list[Condition] = [()]
-    for name in _outer_first(design, names):
-        factor = design.factors[name]
-        found = [
-            (*cell, (name, level))
-            for cell in found
-            for level in factor.levels_within(dict((*given, *cell)).get(factor.within or ""))
-        ]
-    return [_in_order(design, cell) for cell in found]
-
-
-def _outer_first(design: DesignConfig, names: Sequence[str]) -> list[str]:
-    return sorted(names, key=lambda name: design.factors[name].within is not None)
 
 
 def groups(design: DesignConfig) -> list[Condition]:
@@ -47,7 +27,7 @@ def square_size(design: DesignConfig) -> int:
     """How many rows the balancing square has; 0 if no order is balanced over participants."""
     return max(
         len(square_rows(_square(design.order.sessions), len(_sessions(design, ())))),
-        len(square_rows(_square(design.order.trials), len(_session_cells(design, ())))),
+        len(square_rows(_square(design.order.trials), len(session_cells(design, ())))),
     )
 
 
@@ -57,11 +37,6 @@ def _square(order: BlockOrder) -> Order:
 
 def _sessions(design: DesignConfig, given: Condition) -> list[Condition]:
     return cells(design, design.order.session, given)
-
-
-def _session_cells(design: DesignConfig, given: Condition) -> list[Condition]:
-    names = [name for name in design.varying if name != design.trial.compare or design.trial.kind != "pair"]
-    return cells(design, names, given)
 
 
 def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | None = None, group: int = 0) -> Plan:
@@ -83,7 +58,7 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
     trials = [
         trial
         for number, levels in enumerate(sessions, start=1)
-        for trial in _session(design, number, (*given, *levels), _Streams(seed, (*who, str(number))), row)
+        for trial in _session(design, number, (*given, *levels), Streams(seed, (*who, str(number))), row)
     ]
     return Plan(
         experiment=design.design,
@@ -101,8 +76,8 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
     The levels of the other factors are drawn. A practice is of the gun: it has no instruction.
     """
     practice, given = design.practice, _chosen("group", groups(design), group)
-    streams = _Streams(seed, (design.design, participant_id, "practice"))
-    alike: dict[Condition, list[_Content]] = {}
+    streams = Streams(seed, (design.design, participant_id, "practice"))
+    alike: dict[Condition, list[Content]] = {}
     for content in _everything(design, given, streams):
         cell = tuple(pair for pair in content.levels if pair[0] in practice.of)
         alike.setdefault(cell, []).append(content)
@@ -132,28 +107,22 @@ def _without(name: str, levels: Condition) -> Condition:
     return tuple(pair for pair in levels if pair[0] != name)
 
 
-def _some(contents: Sequence[_Content], count: int, stream: Stream) -> list[_Content]:
+def _some(contents: Sequence[Content], count: int, stream: Stream) -> list[Content]:
     """So many of the contents, each as often as the others."""
     times = -(-count // len(contents))
     return stream.shuffled(list(contents) * times)[:count]
 
 
-def _everything(design: DesignConfig, given: Condition, streams: _Streams) -> Iterator[_Content]:
+def _everything(design: DesignConfig, given: Condition, streams: Streams) -> Iterator[Content]:
     """Every trial that a participant may meet but catch trials, with all its levels."""
     for blocked in cells(design, (*design.order.session, *design.order.set), given):
         held = (*given, *blocked)
-        for content in _contents(design, held, streams):
+        for content in trial_contents(design, held, streams):
             if not content.catch:
-                yield replace(content, levels=_in_order(design, (*held, *content.levels)))
+                yield replace(content, levels=in_order(design, (*held, *content.levels)))
 
 
-def _in_order(design: DesignConfig, levels: Condition) -> Condition:
-    """Levels in the order of the file."""
-    order = {name: at for at, name in enumerate(design.factors)}
-    return tuple(sorted(levels, key=lambda pair: order[pair[0]]))
-
-
-def _trial(design: DesignConfig, place: tuple[int, int, int], levels: Condition, content: _Content) -> Trial:
+def _trial(design: DesignConfig, place: tuple[int, int, int], levels: Condition, content: Content) -> Trial:
     session, part, trial = place
     return Trial(
         session=session,
@@ -183,31 +152,10 @@ def _ordered(order: BlockOrder, items: Sequence[Condition], row: int | None, str
     return [items[place] for place in rows[row % len(rows)]]
 
 
-@dataclass(frozen=True, slots=True)
-class _Streams:
-    seed: int
-    session: tuple[str, ...]
-
-    def of(self, purpose: str, *more: str) -> Stream:
-        return Stream(self.seed, purpose, *self.session, *more)
-
-
-@dataclass(frozen=True, slots=True)
-class _Content:
-    """What a trial holds, before its place is known."""
-
-    levels: Condition
-    intervals: tuple[Level, ...] = ()
-    odd: int | None = None
-    catch: bool = False
-
-
-def _session(
-    design: DesignConfig, number: int, given: Condition, streams: _Streams, row: int | None
-) -> Iterator[Trial]:
+def _session(design: DesignConfig, number: int, given: Condition, streams: Streams, row: int | None) -> Iterator[Trial]:
     sets = design.order.sets
     set_levels = _set_levels(design, given, streams)
-    contents = _contents(design, given, streams)
+    contents = trial_contents(design, given, streams)
     check_sets(design, len(contents))
     if design.order.trials != "random":
         parts = _by_square(design, contents, row, sets)
@@ -220,11 +168,11 @@ def _session(
     for at, part in enumerate(parts):
         for content in part:
             place += 1
-            levels = _in_order(design, (*given, *set_levels[at], *content.levels))
+            levels = in_order(design, (*given, *set_levels[at], *content.levels))
             yield _trial(design, (number, at + 1, place), levels, content)
 
 
-def _set_levels(design: DesignConfig, given: Condition, streams: _Streams) -> list[Condition]:
+def _set_levels(design: DesignConfig, given: Condition, streams: Streams) -> list[Condition]:
     """The levels of each set: each combination equally often, in random order."""
     found, sets = cells(design, design.order.set, given), design.order.sets
     if sets % len(found):
@@ -238,58 +186,6 @@ def _set_levels(design: DesignConfig, given: Condition, streams: _Streams) -> li
 def _multiples(value: int, of: int) -> str:
     below, above = value // of * of, (value // of + 1) * of
     return " or ".join(str(one) for one in (below, above) if one)
-
-
-def _contents(design: DesignConfig, given: Condition, streams: _Streams) -> list[_Content]:
-    """What the trials of a session hold: each cell as often as it is repeated, and the catch trials."""
-    found = _session_cells(design, given)
-    count = len(found) * design.order.repetitions + design.trial.catch
-    if count > MAX_TRIALS:
-        raise ConfigError(
-            f"a session of {count:,} trials is more than the {MAX_TRIALS:,} that are planned; repeat less"
-        )
-    if design.trial.intervals > 1:
-        contents = [
-            one for at, cell in enumerate(found) for one in _compared(design, cell, streams.of("intervals", str(at)))
-        ]
-    else:
-        contents = [_Content(cell) for cell in found for _ in range(design.order.repetitions)]
-    blank = tuple(pair for pair in found[0] if len(design.factors[pair[0]].all_levels) == 1) if found else ()
-    return contents + [_Content(blank, catch=True)] * design.trial.catch
-
-
-def _compared(design: DesignConfig, cell: Condition, stream: Stream) -> list[_Content]:
-    """The repetitions of a cell, with every arrangement of its intervals as equally often as it gets."""
-    trial, repetitions = design.trial, design.order.repetitions
-    name = trial.compare or ""
-    if trial.kind == "pair":
-        pairs = list(combinations(design.factors[name].levels_within(None), 2))
-        return [
-            _Content(cell, pair if first else pair[::-1], odd=None)
-            for pair in pairs
-            for first in stream.shuffled([place % 2 == 0 for place in _offset(repetitions, stream)])
-        ]
-    level, standard = dict(cell)[name], trial.standard
-    if standard is None:
-        raise ConfigError(f"trial.standard is missing: kind {trial.kind!r} compares with it")
-    forms = _arrangements(trial.kind, level, standard)
-    chosen = [forms[place % len(forms)] for place in _offset(repetitions, stream, len(forms))]
-    return [_Content(cell, held, odd) for held, odd in stream.shuffled(chosen)]
-
-
-def _offset(count: int, stream: Stream, forms: int = 2) -> range:
-    """So many places in a row, from a random one on: which form comes once more is chance."""
-    start = stream.below(forms)
-    return range(start, start + count)
-
-
-def _arrangements(kind: str, level: Level, standard: Level) -> list[tuple[tuple[Level, ...], int]]:
-    """What the intervals hold, and the place of the comparison: in ABX of the one that X repeats."""
-    if kind == "two-interval":
-        return [((level, standard), 0), ((standard, level), 1)]
-    if kind == "abx":
-        return [((*pair, pair[x]), x) for pair in ((level, standard), (standard, level)) for x in (0, 1)]
-    return [(tuple(level if at == odd else standard for at in range(3)), odd) for odd in range(3)]
 
 
 def check_sets(design: DesignConfig, trials: int) -> None:
@@ -315,18 +211,18 @@ def check_sets(design: DesignConfig, trials: int) -> None:
         )
 
 
-def _shared(design: DesignConfig, contents: list[_Content], streams: _Streams) -> list[list[_Content]]:
+def _shared(design: DesignConfig, contents: list[Content], streams: Streams) -> list[list[Content]]:
     """The trials of each set, before they are shuffled."""
     sets, size = design.order.sets, len(contents) // design.order.sets
     if design.order.balance == "session" or sets == 1:
         mixed = streams.of("session-trials").shuffled(contents)
         return [mixed[place * size : (place + 1) * size] for place in range(sets)]
-    alike: dict[tuple[Condition, bool], list[_Content]] = {}
+    alike: dict[tuple[Condition, bool], list[Content]] = {}
     for content in contents:
         alike.setdefault((_balanced(content, design), content.catch), []).append(content)
     # what divides goes to every set; what is left over is dealt round in a random order, so sizes stay equal
-    dealt: list[list[_Content]] = [[] for _ in range(sets)]
-    left: list[_Content] = []
+    dealt: list[list[Content]] = [[] for _ in range(sets)]
+    left: list[Content] = []
     for cell in streams.of("dealing").shuffled(list(alike)):
         same = alike[cell]
         each = len(same) // sets
@@ -339,15 +235,15 @@ def _shared(design: DesignConfig, contents: list[_Content], streams: _Streams) -
     return dealt
 
 
-def _balanced(content: _Content, design: DesignConfig) -> Condition:
+def _balanced(content: Content, design: DesignConfig) -> Condition:
     """What is balanced of a trial: its cell, or its pair."""
     pair = tuple(sorted(map(shown_level, content.intervals))) if design.trial.kind == "pair" else ()
     return (*content.levels, *(("pair", one) for one in pair))
 
 
-def _by_square(design: DesignConfig, contents: list[_Content], row: int | None, sets: int) -> list[list[_Content]]:
+def _by_square(design: DesignConfig, contents: list[Content], row: int | None, sets: int) -> list[list[Content]]:
     """The cells in a row of the square, or as they stand, as often as they are repeated."""
-    alike: dict[Condition, list[_Content]] = {}
+    alike: dict[Condition, list[Content]] = {}
     for content in contents:
         alike.setdefault(_balanced(content, design), []).append(content)
     order = list(alike)
@@ -362,14 +258,14 @@ def _by_square(design: DesignConfig, contents: list[_Content], row: int | None, 
 _TRIES = 200
 
 
-def _limited(design: DesignConfig, contents: list[_Content], streams: _Streams) -> list[list[_Content]]:
+def _limited(design: DesignConfig, contents: list[Content], streams: Streams) -> list[list[Content]]:
     """The sets in an order that keeps every limit on runs. `ConfigError`: none was found.
 
     What is in which set is drawn anew at each try, as far as `balance` leaves it open.
     """
     limits = design.order.longest_run
     for attempt in range(_TRIES):
-        drawn = _Streams(streams.seed, (*streams.session, "runs", str(attempt)))
+        drawn = Streams(streams.seed, (*streams.session, "runs", str(attempt)))
         stream, run, done = streams.of("runs", str(attempt)), _Run(limits), []
         for part in _shared(design, contents, drawn):
             ordered = _in_limits(part, run, stream)
@@ -394,11 +290,11 @@ class _Run:
         last, length = self.last[name]
         return length + 1 if last == level else 1
 
-    def takes(self, content: _Content) -> bool:
+    def takes(self, content: Content) -> bool:
         levels = dict(content.levels)
         return all(self.length(name, levels.get(name)) <= most for name, most in self.limits.items())
 
-    def add(self, content: _Content) -> None:
+    def add(self, content: Content) -> None:
         levels = dict(content.levels)
         self.last = {name: (levels.get(name), self.length(name, levels.get(name))) for name in self.limits}
 
@@ -413,11 +309,11 @@ class _Run:
         return True
 
 
-def _in_limits(part: list[_Content], run: _Run, stream: Stream) -> list[_Content] | None:
+def _in_limits(part: list[Content], run: _Run, stream: Stream) -> list[Content] | None:
     """One set in an order that keeps the limits, found from front to back; `None` if it ran into a dead end."""
     left = Counter(part)
     levels = {name: Counter(dict(content.levels).get(name) for content in part) for name in run.limits}
-    done: list[_Content] = []
+    done: list[Content] = []
     while len(done) < len(part):
         total = len(part) - len(done) - 1
         allowed = [
@@ -434,7 +330,7 @@ def _in_limits(part: list[_Content], run: _Run, stream: Stream) -> list[_Content
     return done
 
 
-def _drawn(allowed: Sequence[_Content], left: Counter[_Content], stream: Stream) -> _Content:
+def _drawn(allowed: Sequence[Content], left: Counter[Content], stream: Stream) -> Content:
     """One of the allowed, the more likely the more there is left of it."""
     place = stream.below(sum(left[one] for one in allowed))
     for one in allowed:
@@ -444,7 +340,7 @@ def _drawn(allowed: Sequence[_Content], left: Counter[_Content], stream: Stream)
     raise AssertionError("the counts are above 0")
 
 
-def _leaves_room(content: _Content, run: _Run, levels: Mapping[str, Counter[Level | None]], total: int) -> bool:
+def _leaves_room(content: Content, run: _Run, levels: Mapping[str, Counter[Level | None]], total: int) -> bool:
     after = _Run(run.limits)
     after.last = run.last
     after.add(content)

@@ -17,6 +17,7 @@ from device.words import Direction, Drive, LimitError, Shot
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
+from experiments.design.contents import cells
 from experiments.design.language import (
     DIRECTION_FACTOR,
     EMPTY,
@@ -27,7 +28,7 @@ from experiments.design.language import (
     shown_level,
 )
 from experiments.design.plan import Condition, Plan, Trial
-from experiments.design.planning import cells, groups
+from experiments.design.planning import groups
 
 DRIVEN = ("voltage_V", "pulse_s")
 """What the command of a shot carries."""
