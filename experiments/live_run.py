@@ -20,11 +20,11 @@ from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
-from experiments.session.history import History
+from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
 from experiments.session.remarks import Remark, remark_record
 from experiments.session.states import ARMED, Position, State, entered
-from experiments.session.steps import Outcome, Step
+from experiments.session.steps import Outcome, Session, Step, step_after, step_record
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
@@ -80,7 +80,10 @@ class Screen(Protocol):
 
 
 class LiveRun:
-    """Where a run is, and what was done so far. Every method but `enter`, `wait` and `sleep` from any thread."""
+    """Where a run is, and what was done so far. Every method but `enter`, `wait` and `sleep` from any thread.
+
+    `told` is what the session reads: it grows in the order of the journal, and what screens see when that is synced.
+    """
 
     def __init__(
         self,
@@ -91,11 +94,12 @@ class LiveRun:
         clock: Clock,
         screen: Screen,
         guard_s: float,
-        history: History = (),
+        told: GrowingHistory | None = None,
     ) -> None:
         self.plan, self.clock, self.guard_s = plan, clock, guard_s
         self.gun, self.journal, self._screen = gun, journal, screen
-        self._history = list(history)
+        self._told: GrowingHistory = [] if told is None else told
+        self._history = list(self._told)
         self._position = Position(since_s=clock.now())
         self._painted_s: float | None = None
         self._pauses: list[tuple[float, float]] = []
@@ -259,10 +263,28 @@ class LiveRun:
                 self.clock.wait(self.news, left_s)
 
     def keep(self, step: Step, outcome: Outcome) -> None:
-        """Take an outcome that is on the disk, and show that it is."""
+        """Have an outcome written, and when it is on the disk show that it is."""
+        with self.news:
+            painted = {} if self.shown_s is None else {"shown_s": self.shown_s}
+            written = self.journal.submit("outcome", body=step_record(outcome), **painted)
+            self._told.append((step, outcome))
+        written.result()
         with self.news:
             self._history.append((step, outcome))
         self._screen.acknowledge(step, outcome)
+
+    def go_on(self, session: Session, outcome: Outcome) -> Step | None:
+        """The session's next step, which the journal has when this returns; `None` at its end.
+
+        Made and written under the lock: a correction lies before it, and counts for it, or behind it.
+        """
+        with self.news:
+            step = step_after(session, outcome)
+            if step is None:
+                return None
+            written = self.journal.submit("step", body=step_record(step))
+        written.result()
+        return step
 
     def remark(self, remark: Remark) -> None:
         """Have a remark written behind what was written before, and shown when it is on the disk."""
@@ -276,6 +298,7 @@ class LiveRun:
             written = self.journal.submit("remark", body=remark_record(remark))
         except RuntimeError:
             return None
+        self._told.append((None, remark))
         self._history.append((None, remark))
         return written
 

@@ -37,7 +37,8 @@ from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
-from experiments.session.steps import Answered, Describe, Session
+from experiments.session.history import GrowingHistory
+from experiments.session.steps import Answered, Describe, Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
@@ -145,13 +146,14 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         _refuse_excluded(place, registered)
     with closing(_open_gun(request, stimuli, clock)) as gun:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
-        session, screen = design_session(plan, setup), make_screen(setup, plan, clock)
+        told: GrowingHistory = []
+        session, screen = design_session(plan, setup, told), make_screen(setup, plan, clock)
         with _open(place, before, clock) as journal:
             head = _circumstances(request, gun, clock)
             if before is None:
                 position = _begin(session, journal, request, plan, head)
             else:
-                position = _resume(session, journal, before, head)
+                position = _resume(session, journal, before, head, told)
             live = LiveRun(
                 plan=plan,
                 gun=gun,
@@ -159,9 +161,9 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 clock=clock,
                 screen=screen,
                 guard_s=setup.config.console.guard_s,
-                history=position.history,
+                told=told,
             )
-            desk = Desk(live=live, gun_name=gun_name(gun.identify()), shots=stimuli.shots(plan))
+            desk = Desk(live=live, gun_name=gun_name(gun.identify()), stimuli=stimuli)
             screen.begin(live)
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place))
 
@@ -296,18 +298,22 @@ def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, obj
 def _begin(
     session: Session, journal: Journal, request: RunRequest, plan: Plan, head: Mapping[str, object]
 ) -> RunPosition:
-    """Write the head of a new journal."""
+    """Write the head of a new journal, and the first step."""
     setup, why = request.setup, {"set_aside_reason": request.anew_reason} if request.anew_reason else {}
     laws = {} if setup.laws is None else {"laws": setup.laws.model_dump(mode="json")}
     who = {"participant": request.participant_kind}
     plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **who, **why, **laws}
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **head)
-    return RunPosition(step=next(session))
+    step = next(session)
+    journal.append("step", body=step_record(step))
+    return RunPosition(step=step)
 
 
-def _resume(session: Session, journal: Journal, before: Contents, head: Mapping[str, object]) -> RunPosition:
+def _resume(
+    session: Session, journal: Journal, before: Contents, head: Mapping[str, object], told: GrowingHistory
+) -> RunPosition:
     """Stand where a run broke off, and write that it goes on."""
-    position = replay.replay(session, before)
+    position = replay.replay(session, before, told)
     journal.append("resumed", cut_bytes=before.cut_bytes, stopped_utc=before.records[-1].utc, **head)
     return replay.go_on(session, before, position, journal.append)
 

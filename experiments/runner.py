@@ -10,13 +10,13 @@ the line nor this machine delays them. Each is in the journal before the next is
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from device.words import Identity
 from experiments.design.plan import Trial
+from experiments.design.stimuli import Stimuli
 from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.record.replay import RunPosition
 from experiments.session import events, steps
@@ -28,11 +28,11 @@ from experiments.tasks.questions import on_scale
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
-    """All that carries steps out: the live run with its gun, what that is called, and the shot of each interval."""
+    """All that carries steps out: the live run with its gun, what that is called, and what it can fire."""
 
     live: LiveRun
     gun_name: str
-    shots: Mapping[tuple[Trial, int], Shot | None]
+    stimuli: Stimuli
 
 
 class Train:
@@ -102,7 +102,7 @@ def gun_name(identity: Identity) -> str:
 
 
 def carry_out(session: steps.Session, desk: Desk, position: RunPosition) -> None:
-    """Carry out a session from where it stands to its end.
+    """Carry out a session from where it stands, at a step that the journal has, to its end.
 
     `RunStopped`, `JournalError` and interrupts pass through; whatever happens, the gun is disarmed. After an emergency
     stop the run stays where it is until it is closed, also if the gun does not answer.
@@ -133,16 +133,10 @@ class _Runner:
         if position.halted:
             self._rearm(trial_at(self._live.plan, position.history, step))
         while step is not None:
-            self._live.journal.append("step", body=steps.step_record(step))
             outcome = self._do(step)
-            self._live.journal.append("outcome", body=steps.step_record(outcome), **self._shown())
             self._live.keep(step, outcome)
             self._count(outcome)
-            step = steps.step_after(self._session, outcome)
-
-    def _shown(self) -> dict[str, float]:
-        """When the step was painted, where that is known."""
-        return {} if self._live.shown_s is None else {"shown_s": self._live.shown_s}
+            step = self._live.go_on(self._session, outcome)
 
     def _count(self, outcome: steps.Outcome) -> None:
         if isinstance(outcome, steps.Prepared):
@@ -335,7 +329,8 @@ class DeskGun:
         self, step: steps.FireShot, not_before_s: float | None = None
     ) -> steps.Fired | steps.Failed | steps.Interrupted:
         """One shot, armed for it alone; in a catch trial, or an empty interval, nothing is armed and nothing fires."""
-        shot, asked, before = self._desk.shots[step.trial, step.interval], False, step.interval > 0
+        felt = step.trial.with_chosen(step.chosen)
+        shot, asked, before = self._desk.stimuli.shot(felt, step.interval), False, step.interval > 0
         try:
             if shot is None:
                 return self._nothing(step, not_before_s)
@@ -378,7 +373,7 @@ class DeskGun:
 
     def present(self, step: steps.Present) -> steps.Presented | steps.Failed | steps.Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""
-        train, asked, shot = Train(step, self._desk), False, self._shot(step.trial)
+        train, asked, shot = Train(step, self._desk), False, self._shot(step.trial.with_chosen(step.chosen))
         try:
             self._get_ready(State.TRAIN, step)
             asked = True
@@ -426,8 +421,7 @@ class DeskGun:
 
     def _shot(self, trial: Trial) -> Shot:
         """The first shot that is felt of a trial; of a catch trial, that of any other."""
-        own = (shot for (one, _), shot in self._desk.shots.items() if one == trial)
-        return next(shot for shot in (*own, *self._desk.shots.values()) if shot is not None)
+        return self._desk.stimuli.first_shot((trial, *self._live.plan.trials))
 
     def _failed(self, error: DeviceError, *, felt: bool) -> steps.Failed | steps.Interrupted:
         """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""

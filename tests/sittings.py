@@ -24,6 +24,7 @@ from experiments.run import RunRequest, run
 from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
 from experiments.session.design_session import design_session
+from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
@@ -123,15 +124,24 @@ class Sitting(NamedTuple):
     journal: Journal
 
     def carry_out(self) -> list[tuple[Step, Outcome]]:
-        going = design_session(self.plan, self.setup)
+        told: GrowingHistory = []
+        going = design_session(self.plan, self.setup, told)
         live = LiveRun(
-            plan=self.plan, gun=self.gun, journal=self.journal, clock=self.clock, screen=self.screen, guard_s=0.25
+            plan=self.plan,
+            gun=self.gun,
+            journal=self.journal,
+            clock=self.clock,
+            screen=self.screen,
+            guard_s=0.25,
+            told=told,
         )
         stimuli = stimuli_of(self.setup.config, self.setup.gun)
-        desk = Desk(live=live, gun_name="simulated", shots=stimuli.shots(self.plan))
+        desk = Desk(live=live, gun_name="simulated", stimuli=stimuli)
         self.screen.begin(live)
         with self.journal:
-            carry_out(going, desk, RunPosition(step=next(going)))
+            first = next(going)
+            self.journal.append("step", body=step_record(first))
+            carry_out(going, desk, RunPosition(step=first))
         return replay.outcomes(replay.history(read_journal(self.where.journal)))
 
     def rows(self) -> list[dict[str, str]]:

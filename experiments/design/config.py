@@ -33,6 +33,8 @@ from experiments.design.language import (
     TrialConfig,
     shown_level,
 )
+from experiments.design.procedure_problems import procedure_problems
+from experiments.design.procedures.config import AdaptiveConfig, ConstantConfig, ProcedureConfig
 
 
 class DesignConfig(Model):
@@ -49,6 +51,7 @@ class DesignConfig(Model):
     factors: dict[ColumnName, FactorConfig] = Field(min_length=1, max_length=20)
     order: OrderConfig = OrderConfig()
     trial: TrialConfig = TrialConfig()
+    procedure: ProcedureConfig = ConstantConfig(kind="constant")
     questions: dict[ColumnName, QuestionConfig] = Field(min_length=1, max_length=20)
     opening: tuple[OpeningConfig, ...] = ()
     practice: PracticeConfig = PracticeConfig()
@@ -103,6 +106,16 @@ class DesignConfig(Model):
         blocked = {*self.order.session, *self.order.set, *self.between}
         return tuple(name for name in self.factors if name not in blocked)
 
+    @property
+    def adaptive(self) -> AdaptiveConfig | None:
+        """How levels are chosen from the answers so far; `None` where all are planned beforehand."""
+        return None if isinstance(self.procedure, ConstantConfig) else self.procedure
+
+    @property
+    def adapted(self) -> tuple[str, ...]:
+        """The factors whose levels are chosen from the answers so far."""
+        return self.adaptive.of if self.adaptive else ()
+
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         for problem in _problems(self):
@@ -117,6 +130,8 @@ def _problems(design: DesignConfig) -> Iterator[str]:
     yield from _blocking_problems(design)
     yield from _trial_problems(design)
     yield from _feedback_problems(design)
+    if design.adaptive is not None:
+        yield from procedure_problems(design.adaptive, design.factors, design.order, design.trial, design.questions)
     for name, question in design.questions.items():
         yield from (f"questions.{name}: {problem}" for problem in _right_answer_problems(design, question))
     unknown = sorted(set(design.assumed) - set(leaves(design)))
@@ -131,6 +146,7 @@ _COMMON_COLUMNS = frozenset(
         "session",
         "set",
         "trial",
+        "track",
         "stimulus",
         "attempts",
         "flags",

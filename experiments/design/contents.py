@@ -65,6 +65,7 @@ class Content:
     intervals: tuple[Level, ...] = ()
     odd: int | None = None
     catch: bool = False
+    track: int = 0
 
 
 def trial_contents(design: DesignConfig, given: Condition, streams: Streams) -> list[Content]:
@@ -81,8 +82,13 @@ def trial_contents(design: DesignConfig, given: Condition, streams: Streams) -> 
         ]
     else:
         contents = [Content(cell) for cell in found for _ in range(design.order.repetitions)]
+    return contents + catch_contents(design, found)
+
+
+def catch_contents(design: DesignConfig, found: Sequence[Condition]) -> list[Content]:
+    """The catch trials of a session, with the levels that all of its cells share."""
     blank = tuple(pair for pair in found[0] if len(design.factors[pair[0]].all_levels) == 1) if found else ()
-    return contents + [Content(blank, catch=True)] * design.trial.catch
+    return [Content(blank, catch=True)] * design.trial.catch
 
 
 def _compared(design: DesignConfig, cell: Condition, stream: Stream) -> list[Content]:
@@ -94,23 +100,23 @@ def _compared(design: DesignConfig, cell: Condition, stream: Stream) -> list[Con
         return [
             Content(cell, pair if first else pair[::-1], odd=None)
             for pair in pairs
-            for first in stream.shuffled([place % 2 == 0 for place in _offset(repetitions, stream)])
+            for first in stream.shuffled([place % 2 == 0 for place in some_places(repetitions, stream)])
         ]
     level, standard = dict(cell)[name], trial.standard
     if standard is None:
         raise ConfigError(f"trial.standard is missing: kind {trial.kind!r} compares with it")
-    forms = _arrangements(trial.kind, level, standard)
-    chosen = [forms[place % len(forms)] for place in _offset(repetitions, stream, len(forms))]
+    forms = arrangements(trial.kind, level, standard)
+    chosen = [forms[place % len(forms)] for place in some_places(repetitions, stream, len(forms))]
     return [Content(cell, held, odd) for held, odd in stream.shuffled(chosen)]
 
 
-def _offset(count: int, stream: Stream, forms: int = 2) -> range:
+def some_places(count: int, stream: Stream, forms: int = 2) -> range:
     """So many places in a row, from a random one on: which form comes once more is chance."""
     start = stream.below(forms)
     return range(start, start + count)
 
 
-def _arrangements(kind: str, level: Level, standard: Level) -> list[tuple[tuple[Level, ...], int]]:
+def arrangements(kind: str, level: Level, standard: Level) -> list[tuple[tuple[Level, ...], int]]:
     """What the intervals hold, and the place of the comparison: in ABX of the one that X repeats."""
     if kind == "two-interval":
         return [((level, standard), 0), ((standard, level), 1)]

@@ -5,10 +5,11 @@ What a table can tell by itself is checked here; what two must agree on, where t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from experiments.config.door import Model, once
 from experiments.config.findings import COLUMN_NAME, OWN_KEY
@@ -33,6 +34,9 @@ METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL = (
     "repeat_every_s",
 )
 
+DRIVEN = ("voltage_V", "pulse_s")
+"""What the command of a shot carries."""
+
 
 def shown_level(level: Level) -> str:
     """A level as it stands in tables and messages.
@@ -54,7 +58,57 @@ def _levels(levels: Levels) -> Levels:
     return levels
 
 
-SomeLevels = Annotated[Levels, Field(min_length=1, max_length=100), AfterValidator(_levels)]
+MAX_LEVELS = 100
+SomeLevels = Annotated[Levels, Field(min_length=1, max_length=MAX_LEVELS), AfterValidator(_levels)]
+
+
+class EvenLevels(Model):
+    """Levels at even distances, from the minimum to the maximum."""
+
+    minimum: float
+    maximum: float
+    grain: Annotated[float, Field(gt=0)]
+
+    @model_validator(mode="after")
+    def _grain_divides(self) -> Self:
+        steps = (self.maximum - self.minimum) / self.grain
+        if not 1 - _OFF <= steps < MAX_LEVELS - 0.5:
+            raise ValueError(
+                f"minimum {self.minimum:g}, maximum {self.maximum:g} and grain {self.grain:g} make "
+                f"{math.floor(max(steps, -1) + _OFF) + 1} levels; they must make 2 to {MAX_LEVELS}"
+            )
+        if abs(steps - round(steps)) > _OFF * steps:
+            near = self.minimum + math.floor(steps) * self.grain
+            raise ValueError(
+                f"grain {self.grain:g} does not divide {self.minimum:g} to {self.maximum:g}; nearest: maximum = "
+                f"{near:g} or {near + self.grain:g}"
+            )
+        return self
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """The levels, with the decimals that a person would write."""
+        count = round((self.maximum - self.minimum) / self.grain) + 1
+        return tuple(round(self.minimum + place * self.grain, 12) for place in range(count))
+
+
+_OFF = 1e-9
+"""So much a division may be off, as a share."""
+
+
+def _levels_kind(levels: object) -> str:
+    """Which way a factor's levels are written: as a list, at even distances, or by another factor's levels."""
+    if not isinstance(levels, dict):
+        return "even" if isinstance(levels, EvenLevels) else "list"
+    return "nested" if any(isinstance(one, list | tuple) for one in levels.values()) or not levels else "even"
+
+
+FactorLevels = Annotated[
+    Annotated[SomeLevels, Tag("list")]
+    | Annotated[EvenLevels, Tag("even")]
+    | Annotated[dict[str, SomeLevels], Tag("nested")],
+    Discriminator(_levels_kind),
+]
 
 
 class FactorConfig(Model):
@@ -63,7 +117,7 @@ class FactorConfig(Model):
     `sets`: what a level set by hand means for the model of the gun; `texts`: what is read out under an instruction.
     """
 
-    levels: SomeLevels | dict[str, SomeLevels]
+    levels: FactorLevels
     within: ColumnName | None = None
     between: bool = False
     labels: dict[str, LineText] = Field(default_factory=dict)
@@ -97,6 +151,8 @@ class FactorConfig(Model):
     @property
     def all_levels(self) -> Levels:
         """Every level once, in the order of the file."""
+        if isinstance(self.levels, EvenLevels):
+            return self.levels.levels
         lists = self.levels.values() if isinstance(self.levels, dict) else [self.levels]
         return tuple(dict.fromkeys(level for one in lists for level in one))
 
@@ -104,7 +160,7 @@ class FactorConfig(Model):
         """The levels that there are, in the outer factor's level if it is nested."""
         if isinstance(self.levels, dict):
             return self.levels.get(shown_level("" if outer is None else outer), ())
-        return self.levels
+        return self.all_levels
 
     def label(self, level: Level) -> str:
         """What a level is called."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from pydantic import TypeAdapter
 
@@ -52,6 +52,8 @@ def condition(**levels: Level) -> Condition:
     return tuple((name, level) for name, level in levels.items() if level != "")
 
 
+CHOSEN = "chosen"
+"""In an interval: the level that a procedure chooses when its trial comes. Adapted levels are numbers."""
 _BLANKS: dict[str, object] = {
     "practice": False,
     "instruction": "",
@@ -59,6 +61,10 @@ _BLANKS: dict[str, object] = {
     "intervals": (),
     "odd": None,
     "catch": False,
+    "track": 0,
+    "chosen": (),
+    "at_edge": False,
+    "shown": False,
     "settings": (),
     "interval": 0,
     "gap_s": 0.0,
@@ -82,7 +88,8 @@ class Trial:
     """One planned trial. `session`, `set` and `trial` count from 1; `trial` runs through the session.
 
     `intervals` are the levels of the factor `compare`, in the order in which they are felt, and `odd` the place among
-    them (from 0) of the comparison: in ABX of the one that X repeats. A `catch` trial has no stimulus.
+    them (from 0) of the comparison: in ABX of the one that X repeats. A `catch` trial has no stimulus. A trial of a
+    `track`, counted from 1, has no level of the factors that its procedure adapts, and `CHOSEN` in its intervals.
     """
 
     session: int
@@ -93,6 +100,14 @@ class Trial:
     intervals: tuple[Level, ...] = ()
     odd: int | None = None
     catch: bool = False
+    track: int = 0
+
+    def with_chosen(self, chosen: Condition) -> Trial:
+        """The trial with the levels that a procedure chose for it, where it has none yet: what was felt."""
+        own = dict(chosen).get(self.compare)
+        held = tuple(own if level == CHOSEN and own is not None else level for level in self.intervals)
+        new = tuple(pair for pair in chosen if self.level(pair[0]) is None)
+        return replace(self, levels=(*self.levels, *new), intervals=held) if new else self
 
     def level(self, name: str) -> Level | None:
         """The level of a factor; `None` if the trial has none."""

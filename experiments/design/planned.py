@@ -13,6 +13,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import DIRECTION_FACTOR, shown_level
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.planning import groups, plan_of
+from experiments.design.procedures.config import least_of_track
 from experiments.design.stimuli import by_hand, settings
 
 
@@ -20,8 +21,9 @@ from experiments.design.stimuli import by_hand, settings
 class PlannedRun:
     """One run as planned: `break_s` of `duration_s` are rests; `hand_changes` is how often hands set something anew.
 
-    `session_trials`: how many trials each session has. `hands_within`: how often hands have something to set or to turn
-    between the intervals of a trial.
+    `session_trials`: how many trials each session has. `least_trials` and `least_duration_s` are those where every
+    track of a procedure is as short as it can be, the others where it is as long. `hands_within`: how often hands have
+    something to set or to turn between the intervals of a trial.
     """
 
     sessions: int
@@ -33,6 +35,8 @@ class PlannedRun:
     trials_without_break: int
     hand_changes: int
     hands_within: int
+    least_trials: int
+    least_duration_s: float
 
 
 def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
@@ -47,21 +51,44 @@ def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) 
 
 def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
     """What a plan comes to, whether or not the design allows it."""
-    timing, trials = design.timing, plan.trials
+    trials = plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
-    trial_s = timing.hand_over_s + timing.stimulus_s + timing.answer_s
-    within = sum(_hands_within(design, gun, trial) for trial in trials)
+    shortest = _shortest(design, trials)
     return PlannedRun(
         sessions=len({trial.session for trial in trials}),
         sets=len({(trial.session, trial.set) for trial in trials}),
         trials=len(trials),
         session_trials=tuple(Counter(trial.session for trial in trials).values()),
         break_s=sum(rests_s),
-        duration_s=timing.opening_s + len(trials) * trial_s + within * timing.hand_over_s + sum(rests_s),
+        duration_s=_duration_s(design, trials, gun),
         trials_without_break=max(_stretches(rests_s)),
         hand_changes=sum(_by_hand(design, gun, one) != _by_hand(design, gun, other) for one, other in pairwise(trials)),
-        hands_within=within,
+        hands_within=sum(_hands_within(design, gun, trial) for trial in trials),
+        least_trials=len(shortest),
+        least_duration_s=_duration_s(design, shortest, gun),
     )
+
+
+def _duration_s(design: DesignConfig, trials: Sequence[Trial], gun: GunConfig | None) -> float:
+    """How long some trials take, with the rests between them."""
+    timing = design.timing
+    rests_s = sum(_rest_s(design, before, trial) for before, trial in pairwise(trials))
+    trial_s = timing.hand_over_s + timing.stimulus_s + timing.answer_s
+    within = sum(_hands_within(design, gun, trial) for trial in trials)
+    return timing.opening_s + len(trials) * trial_s + within * timing.hand_over_s + rests_s
+
+
+def _shortest(design: DesignConfig, trials: Sequence[Trial]) -> list[Trial]:
+    """The trials that there are where every track ends as early as it can."""
+    if design.adaptive is None:
+        return list(trials)
+    least, taken = least_of_track(design.adaptive), Counter[int]()
+    kept = []
+    for trial in trials:
+        taken[trial.track] += 1
+        if not trial.track or taken[trial.track] <= least:
+            kept.append(trial)
+    return kept
 
 
 def plans_of_groups(design: DesignConfig) -> list[Plan]:
@@ -167,9 +194,10 @@ _MUCH = 1.5
 def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:
     """What is allowed and most likely not meant."""
     if found.duration_s > design.timing.planned_s:
+        most = "up to " if found.least_trials < found.trials else ""
         yield (
-            f"the plan takes {found.duration_s:g} s, longer than timing.planned_s = {design.timing.planned_s:g} s, "
-            "which is what participants are told"
+            f"the plan takes {most}{found.duration_s:g} s, longer than timing.planned_s = "
+            f"{design.timing.planned_s:g} s, which is what participants are told"
         )
     if design.timing.planned_s > _MUCH * found.duration_s:
         yield (
@@ -177,7 +205,9 @@ def warnings(design: DesignConfig, found: PlannedRun) -> Iterator[str]:
             f"{_MUCH:g} times the {found.duration_s:g} s that the plan takes"
         )
     if found.trials > 1 and found.hand_changes > found.trials // 2:
-        varied = [name for name in by_hand(design) if name in design.varying and len(design.factors[name].levels) > 1]
+        varied = [
+            name for name in by_hand(design) if name in design.varying and len(design.factors[name].all_levels) > 1
+        ]
         what = ", ".join(varied) or "method"
         yield (
             f"hands set something anew {found.hand_changes} times in {found.trials} trials ({what}); name the factor "

@@ -16,6 +16,7 @@ from experiments.design.contents import Content, Streams, cells, in_order, sessi
 from experiments.design.language import INSTRUCTION_FACTOR, BlockOrder, Level, shown_level
 from experiments.design.plan import Condition, Plan, Trial, square_rows
 from experiments.design.streams import Stream
+from experiments.design.track_planning import track_parts
 
 
 def groups(design: DesignConfig) -> list[Condition]:
@@ -66,8 +67,16 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
         seed=seed,
         order_row=row,
         group=group,
-        trials=tuple(trials),
+        trials=tuple(_with_own_tracks(trials)),
     )
+
+
+def _with_own_tracks(trials: Sequence[Trial]) -> Iterator[Trial]:
+    """The trials with their tracks counted through all sessions, in the order in which they are met."""
+    numbers: dict[tuple[int, int], int] = {}
+    for trial in trials:
+        own = numbers.setdefault((trial.session, trial.track), len(numbers) + 1) if trial.track else 0
+        yield replace(trial, track=own) if own != trial.track else trial
 
 
 def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: int = 0) -> Plan | None:
@@ -133,6 +142,7 @@ def _trial(design: DesignConfig, place: tuple[int, int, int], levels: Condition,
         intervals=content.intervals,
         odd=content.odd,
         catch=content.catch,
+        track=content.track,
     )
 
 
@@ -153,23 +163,27 @@ def _ordered(order: BlockOrder, items: Sequence[Condition], row: int | None, str
 
 
 def _session(design: DesignConfig, number: int, given: Condition, streams: Streams, row: int | None) -> Iterator[Trial]:
-    sets = design.order.sets
     set_levels = _set_levels(design, given, streams)
-    contents = trial_contents(design, given, streams)
-    check_sets(design, len(contents))
-    if design.order.trials != "random":
-        parts = _by_square(design, contents, row, sets)
-    elif design.order.longest_run:
-        parts = _limited(design, contents, streams)
-    else:
-        shared = _shared(design, contents, streams)
-        parts = [streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)]
+    table = design.adaptive
+    parts = track_parts(design, table, given, set_levels, streams) if table else _parts(design, given, streams, row)
     place = 0
     for at, part in enumerate(parts):
         for content in part:
             place += 1
             levels = in_order(design, (*given, *set_levels[at], *content.levels))
             yield _trial(design, (number, at + 1, place), levels, content)
+
+
+def _parts(design: DesignConfig, given: Condition, streams: Streams, row: int | None) -> list[list[Content]]:
+    """What each set of a session holds, in order, where all levels are planned."""
+    contents, sets = trial_contents(design, given, streams), design.order.sets
+    check_sets(design, len(contents))
+    if design.order.trials != "random":
+        return _by_square(design, contents, row, sets)
+    if design.order.longest_run:
+        return _limited(design, contents, streams)
+    shared = _shared(design, contents, streams)
+    return [streams.of("trials", str(place)).shuffled(part) for place, part in enumerate(shared)]
 
 
 def _set_levels(design: DesignConfig, given: Condition, streams: Streams) -> list[Condition]:

@@ -6,8 +6,9 @@ lab's own, is set by the experimenter's hand and confirmed; the model is told wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from typing import cast
 
 from device.limits import Load
@@ -20,6 +21,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.contents import cells
 from experiments.design.language import (
     DIRECTION_FACTOR,
+    DRIVEN,
     EMPTY,
     INSTRUCTION_FACTOR,
     METHOD_FACTOR,
@@ -27,11 +29,9 @@ from experiments.design.language import (
     Level,
     shown_level,
 )
-from experiments.design.plan import Condition, Plan, Trial
+from experiments.design.plan import Condition, Trial
 from experiments.design.planning import groups
 
-DRIVEN = ("voltage_V", "pulse_s")
-"""What the command of a shot carries."""
 _GUN_NUMBERS = tuple(
     field.name for field in fields(GunParameters) if isinstance(field.default, float) or field.default is None
 )
@@ -85,18 +85,26 @@ def intervals(design: DesignConfig, gun: GunConfig, trial: Trial) -> tuple[Inter
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stimuli:
-    """All that a run can fire: what the gun is opened with, and the shot of an interval, `None` where nothing is felt.
+    """All that a run can fire: what the gun is opened with, and the shot of some levels.
 
-    A rendering that a hand changes the gun for has a name of its own, which a line to a gun can carry.
+    A rendering that a hand changes the gun for has a name of its own, which a line to a gun can carry. `highest` are
+    the highest levels of what a procedure chooses.
     """
 
     methods: Mapping[str, Method]
-    shot: Callable[[Trial, int], Shot | None]
+    of_levels: Callable[[Condition], Shot]
+    highest: Condition = ()
 
-    def shots(self, plan: Plan) -> dict[tuple[Trial, int], Shot | None]:
-        """The shot of every interval of every trial, the intervals counted from 0."""
-        places = ((trial, place) for trial in plan.trials for place in range(max(1, len(trial.intervals))))
-        return {(trial, place): self.shot(trial, place) for trial, place in places}
+    def shot(self, trial: Trial, interval: int) -> Shot | None:
+        """The shot of an interval, counted from 0; `None` where nothing is felt."""
+        levels = trial.levels_at(interval)
+        return None if levels is None else self.of_levels(levels)
+
+    def first_shot(self, trials: Iterable[Trial]) -> Shot:
+        """The first shot that is felt in some trials; a track's is at the highest levels, before any is chosen."""
+        filled = (trial.with_chosen(self.highest) if trial.track else trial for trial in trials)
+        shots = (self.shot(trial, place) for trial in filled for place in range(max(1, len(trial.intervals))))
+        return next(shot for shot in shots if shot is not None)
 
 
 def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
@@ -106,14 +114,16 @@ def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
         found = stimulus(design, gun, levels)
         names.setdefault(_undriven(found, gun), _name(found, gun, len(names)))
 
-    def shot(trial: Trial, interval: int) -> Shot | None:
-        levels = trial.levels_at(interval)
-        if levels is None:
-            return None
+    @cache
+    def of_levels(levels: Condition) -> Shot:
         found = stimulus(design, gun, levels)
         return Shot(method=names[_undriven(found, gun)], direction=found.direction, drive=found.drive)
 
-    return Stimuli(methods={name: method for method, name in names.items()}, shot=shot)
+    return Stimuli(
+        methods={name: method for method, name in names.items()},
+        of_levels=of_levels,
+        highest=tuple((name, design.factors[name].all_levels[-1]) for name in design.adapted),
+    )
 
 
 def _undriven(found: IntervalStimulus, gun: GunConfig) -> Method:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field, replace
 
 from experiments.design.plan import Trial
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
-from experiments.session.history import History, asked_before
+from experiments.session.history import GrowingHistory, History, asked_before
 from experiments.session.remarks import REMARK, EntryCorrected, Halted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 from experiments.tasks.questions import AnswerValue
@@ -16,13 +16,13 @@ from experiments.tasks.questions import AnswerValue
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunPosition:
-    """Where a run stands: its next step, `None` at the end, and what was done before.
+    """Where a run stands: its next step, `None` at the end, and what was done before, which the session reads.
 
     `halted`: an emergency stop ended it, and no test shot was fired since; one must come before anything else.
     """
 
     step: steps.Step | None
-    history: History = ()
+    history: GrowingHistory = field(default_factory=list)
     halted: bool = False
 
 
@@ -40,13 +40,21 @@ def _halted(contents: Contents) -> bool:
 
 def history(contents: Contents) -> History:
     """All that a journal tells, in order: the steps that were done, each with its outcome, and remarks between them."""
-    found: list[tuple[steps.Step | None, steps.Outcome | Remark]] = []
+    found: GrowingHistory = []
+    for _ in _read(contents, found):
+        pass
+    return found
+
+
+def _read(contents: Contents, found: GrowingHistory) -> Iterator[steps.Step]:
+    """The steps of a journal's records, each when it is there; what lies before it is in `found` by then."""
     step: steps.Step | None = None
     planned = frozenset(contents.plan.trials)
     for line in contents.records:
         if line.kind == "step":
             step = read_as(steps.STEP, line.body, _place(contents, line))
             _check_trial(contents, line, steps.trial_of(step), planned)
+            yield step
         elif line.kind == "remark":
             remark = _remark(contents, line)
             _check_trial(contents, line, getattr(remark, "trial", None), planned)
@@ -61,7 +69,6 @@ def history(contents: Contents) -> History:
                 _check_value(contents, line, step, outcome.value)
             found.append((step, outcome))
             step = None
-    return found
 
 
 def _check_trial(contents: Contents, line: Record, trial: Trial | None, planned: Collection[Trial]) -> None:
@@ -83,33 +90,52 @@ def outcomes(history: History) -> list[tuple[steps.Step, steps.Outcome]]:
     return [(step, outcome) for step, outcome in history if step and not isinstance(outcome, Remark)]
 
 
-def replay(session: steps.Session, contents: Contents) -> RunPosition:
-    """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan."""
-    before = history(contents)
-    step = next(session, None)
-    for number, (recorded, outcome) in enumerate(outcomes(before), start=1):
+def replay(session: steps.Session, contents: Contents, told: GrowingHistory | None = None) -> RunPosition:
+    """Send a journal's outcomes into a fresh session. `JournalError` if they are not those of this plan.
+
+    `told` is what the session reads, empty yet: it has all that lies before a step in the journal when that is made.
+    """
+    told = [] if told is None else told
+    step, sent = next(session, None), 0
+    for number, recorded in enumerate(_read(contents, told), start=1):
+        step, sent = _caught_up(session, step, told, sent)
         _compare(contents, number, step, recorded)
+    step, _ = _caught_up(session, step, told, sent)
+    return RunPosition(step=step, history=told, halted=_halted(contents))
+
+
+def _caught_up(
+    session: steps.Session, step: steps.Step | None, told: GrowingHistory, sent: int
+) -> tuple[steps.Step | None, int]:
+    """The step of a session that was sent the outcomes after so many, and how many those are now."""
+    for _, outcome in outcomes(told[sent:]):
         step = steps.step_after(session, outcome)
-    return RunPosition(step=step, history=before, halted=_halted(contents))
+    return step, len(told)
 
 
 def go_on(
     session: steps.Session, contents: Contents, position: RunPosition, append: Callable[..., None]
 ) -> RunPosition:
-    """Where a replayed run goes on.
+    """Where a replayed run goes on, at a step that is written through `append`.
 
-    The step that was interrupted is recorded as given up, through `append`, and its trial is presented again, because
-    its stimulus may have been felt.
+    The step that was interrupted is recorded as given up, and its trial is presented again, because its stimulus may
+    have been felt.
     """
     step, announced = position.step, _last_step_is_open(contents)
-    if step is None or not (announced or _after_a_stimulus(step) or isinstance(step, steps.FireShot | steps.Present)):
+    if step is None:
         return position
     if not announced:
         append("step", body=steps.step_record(step))
+    if not (announced or _after_a_stimulus(step) or isinstance(step, steps.FireShot | steps.Present)):
+        return position
     felt = _after_a_stimulus(step) or (announced and isinstance(step, steps.FireShot | steps.Present))
     outcome = steps.Interrupted(presented=felt)
     append("outcome", body=steps.step_record(outcome))
-    return replace(position, step=steps.step_after(session, outcome), history=[*position.history, (step, outcome)])
+    position.history.append((step, outcome))
+    again = steps.step_after(session, outcome)
+    if again is not None:
+        append("step", body=steps.step_record(again))
+    return replace(position, step=again)
 
 
 def _after_a_stimulus(step: steps.Step) -> bool:

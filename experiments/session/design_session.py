@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import INSTRUCTION_FACTOR, TRAIN_INTERVAL, QuestionConfig
 from experiments.design.plan import Plan, Trial
+from experiments.design.procedures.choosing import Choice
 from experiments.design.stimuli import settings
+from experiments.session.history import History, of_one_set
 from experiments.session.steps import (
     Ask,
     Asking,
@@ -24,35 +26,59 @@ from experiments.session.steps import (
     Session,
     Step,
 )
+from experiments.session.tracks import Tracks
 from experiments.tasks.questions import choices, correct_columns, right_answer
 
 RIGHT, WRONG = "That was right.", "That was wrong."
 """What the participant is told after an answer, where the design says so."""
 
 
-def design_session(plan: Plan, setup: Setup[DesignConfig]) -> Session:
-    """The steps of a run of a design, from what is told first to its end. A practice is told nothing first."""
-    script = _Script(setup.config, setup.gun, plan)
+def design_session(plan: Plan, setup: Setup[DesignConfig], told: History = ()) -> Session:
+    """The steps of a run of a design, from what is told first to its end. A practice is told nothing first.
+
+    `told` is what was done so far, and grows: levels that follow from the answers so far are chosen by it.
+    """
+    script = _Script(setup.config, setup.gun, plan, told)
     presenter = Presenter(script.presentation)
     if not plan.practice:
         for opening in setup.config.opening:
             yield from presenter.until_done(Inform(text=opening.text, what=opening.kind))
     before: Trial | None = None
+    passed: list[Trial] = []
     for trial in plan.trials:
-        if before is not None and (before.session, before.set) != (trial.session, trial.set):
-            yield from _block_over(presenter, script, before)
+        if before is not None and not of_one_set(before, trial) and script.due(trial):
+            yield from _block_over(presenter, script, before, passed)
             yield from _rest(presenter, script.design, before, trial)
-        yield from presenter.present(trial)
-        for told in script.feedback(presenter, trial):
-            yield from presenter.until_done(told)
-        before = trial
+            yield from _left_over(presenter, script, passed)
+            passed = []
+        passed.append(trial)
+        if (here := script.due(trial)) is not None:
+            yield from _present(presenter, script, here)
+            before = here
     if before is not None:
-        yield from _block_over(presenter, script, before)
+        yield from _block_over(presenter, script, before, passed)
     yield from presenter.close()
+    while script.left(passed):  # by a correction at the end a track is not over
+        yield from _left_over(presenter, script, passed)
+        yield from presenter.close()
 
 
-def _block_over(presenter: Presenter, script: _Script, last: Trial) -> Session:
-    """What is asked about each trial of a set, in order of presentation, once all were felt."""
+def _present(presenter: Presenter, script: _Script, trial: Trial) -> Session:
+    """A trial, and what is told about its answer."""
+    yield from presenter.present(trial)
+    for told in script.feedback(presenter, trial):
+        yield from presenter.until_done(told)
+
+
+def _left_over(presenter: Presenter, script: _Script, passed: Sequence[Trial]) -> Session:
+    """The trials that a track needs by the answers as they count now, though their places were passed."""
+    while (trial := script.left(passed)) is not None:
+        yield from _present(presenter, script, trial)
+
+
+def _block_over(presenter: Presenter, script: _Script, last: Trial, passed: Sequence[Trial]) -> Session:
+    """The trials that are left, and what is asked about each of a set, in order of presentation, once all were felt."""
+    yield from _left_over(presenter, script, passed)
     for trial in script.set_of(last):
         for step in script.questions(trial, when="block"):
             yield from presenter.until_done(step)
@@ -67,28 +93,57 @@ def _rest(presenter: Presenter, design: DesignConfig, before: Trial, trial: Tria
 
 
 class _Script:
-    """What the steps of a design's trials are, all of them made before the first."""
+    """What the steps of a design's trials are, all of them made before the first but for levels that are chosen."""
 
-    def __init__(self, design: DesignConfig, gun: GunConfig, plan: Plan) -> None:
+    def __init__(self, design: DesignConfig, gun: GunConfig, plan: Plan, told: History) -> None:
         self.design, self.gun, self.plan = design, gun, plan
         self._stimuli = {trial: tuple(self._intervals(trial)) for trial in plan.trials}
         self._asked = {
             (trial, when): tuple(self._questions(trial, when)) for trial in plan.trials for when in ("trial", "block")
         }
         scored = next(iter(correct_columns(design.questions)), "")
-        told = design.practice.feedback if plan.practice else design.trial.feedback
-        self._scored = scored if told else ""
-        self._right = {
-            trial: right_answer(design, design.questions[scored], trial) for trial in plan.trials if self._scored
-        }
+        feedback = design.practice.feedback if plan.practice else design.trial.feedback
+        self._scored = scored if feedback else ""
+        table = None if plan.practice else design.adaptive
+        self._tracks = Tracks(design, table, plan, told) if table else None
+        self._shown = table is not None and table.show_level
+        self._of_track = _by_track(plan)
 
     def set_of(self, trial: Trial) -> list[Trial]:
-        return [one for one in self.plan.trials if (one.session, one.set) == (trial.session, trial.set)]
+        return [one for one in self.plan.trials if of_one_set(one, trial)]
 
-    def presentation(self, trial: Trial, attempt: int) -> tuple[Step, ...]:
-        """Every interval, with a hand-over where hands have something to do, then the questions."""
-        stimuli = (replace(step, attempt=attempt) for step in self._stimuli[trial])
-        return (*stimuli, *self.questions(trial, when="trial"))
+    def due(self, trial: Trial) -> Trial | None:
+        """The trial that a place of the plan is for: of a track the next one in the set; `None` if that is over."""
+        if self._tracks is None or not trial.track:
+            return trial
+        if self._tracks.is_over(trial.track):
+            return None
+        own = self._of_track[trial.session, trial.set, trial.track]
+        return next((one for one in own if not self._tracks.has_answer(one)), None)
+
+    def left(self, passed: Sequence[Trial]) -> Trial | None:
+        """A trial whose track is not over, though all of its places were passed."""
+        if self._tracks is None:
+            return None
+        tracks = dict.fromkeys((one.session, one.set, one.track) for one in passed if one.track)
+        return next((trial for one in tracks if (trial := self.due(self._of_track[one][0])) is not None), None)
+
+    def presentation(self, trial: Trial, attempt: int) -> Iterator[Step]:
+        """Every interval, with a hand-over where hands have something to do, then the questions.
+
+        Levels that are chosen are so just before they are felt first; if the track is over by then, nothing is felt.
+        """
+        chosen: Choice | None = None
+        for step in self._stimuli[trial]:
+            if self._tracks is None or not trial.track or isinstance(step, Prepare):
+                yield replace(step, attempt=attempt)
+                continue
+            chosen = chosen or self._tracks.choice(trial.track)
+            if chosen is None:
+                return
+            levels = self._tracks.condition(chosen)
+            yield replace(step, attempt=attempt, chosen=levels, at_edge=chosen.at_edge, shown=self._shown)
+        yield from self.questions(trial, when="trial")
 
     def questions(self, trial: Trial, *, when: str) -> tuple[Asking, ...]:
         """What is asked about a trial at once, or after its block."""
@@ -96,8 +151,11 @@ class _Script:
 
     def feedback(self, presenter: Presenter, trial: Trial) -> Iterator[Inform]:
         """Whether the first scored answer was right, where the design has it told."""
-        right = self._right.get(trial)
-        if right is not None and (trial, self._scored) in presenter.said:
+        if not self._scored or (trial, self._scored) not in presenter.said:
+            return
+        felt = self._tracks.as_felt(trial) if self._tracks is not None else trial
+        right = right_answer(self.design, self.design.questions[self._scored], felt)
+        if right is not None:
             text = RIGHT if presenter.said[trial, self._scored] == right else WRONG
             yield Inform(text=text, what="feedback", trial=trial)
 
@@ -161,6 +219,14 @@ class _Script:
                 return replace(_rate(name, question, trial, (1.0, float(len(self.set_of(trial))), 1.0)), distinct=True)
             case _:
                 return _rate(name, question, trial, question.scale)
+
+
+def _by_track(plan: Plan) -> dict[tuple[int, int, int], list[Trial]]:
+    """The trials of each track in each set."""
+    found: dict[tuple[int, int, int], list[Trial]] = {}
+    for trial in plan.trials:
+        found.setdefault((trial.session, trial.set, trial.track), []).append(trial)
+    return found
 
 
 def _rate(name: str, question: QuestionConfig, trial: Trial, scale: tuple[float, float, float]) -> Rate:

@@ -16,6 +16,8 @@ Word = TypeVar("Word")
 
 History = Sequence[tuple[steps.Step | None, steps.Outcome | Remark]]
 """What a journal tells, in order: steps with their outcomes, and remarks, which have no step."""
+GrowingHistory = list[tuple[steps.Step | None, steps.Outcome | Remark]]
+"""The same while it is still told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

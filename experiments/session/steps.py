@@ -6,14 +6,14 @@ Both are frozen facts. `kind` names them in the journal, from which they are rea
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import asdict, dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
 from device.words import ShotTiming
-from experiments.design.plan import Trial, without_blanks
+from experiments.design.plan import Condition, Trial, without_blanks
 from experiments.tasks.questions import AnswerValue, Choice
 
 
@@ -37,13 +37,17 @@ class Prepare:
 class FireShot:
     """Fire the shot of one of the trial's intervals, counted from 0; of a catch trial, nothing.
 
-    `gap_s`: not sooner than so long after the onset of the interval before.
+    `gap_s`: not sooner than so long after the onset of the interval before. `chosen` are the levels that a procedure
+    chose, `at_edge` at the end of what there is; `shown`: the experimenter may know them.
     """
 
     trial: Trial
     attempt: int
     interval: int = 0
     gap_s: float = 0.0
+    chosen: Condition = ()
+    at_edge: bool = False
+    shown: bool = False
     kind: Literal["fire"] = "fire"
 
 
@@ -92,13 +96,19 @@ class Rest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Present:
-    """Fire a shot every so often until the participant says next, which counts after the least exposure."""
+    """Fire a shot every so often until the participant says next, which counts after the least exposure.
+
+    `chosen`, `at_edge` and `shown`: as in `FireShot`.
+    """
 
     trial: Trial
     attempt: int
     repeat_every_s: float
     max_shots: int
     least_exposure_s: float
+    chosen: Condition = ()
+    at_edge: bool = False
+    shown: bool = False
     kind: Literal["present"] = "present"
 
 
@@ -342,8 +352,8 @@ def step_after(session: Session, outcome: Outcome) -> Step | None:
         return None
 
 
-StepsOf = Callable[[Trial, int], tuple[Step, ...]]
-"""The steps of one presentation of a trial, by its number."""
+StepsOf = Callable[[Trial, int], Iterable[Step]]
+"""The steps of one presentation of a trial, by its number. Each is made when the one before is done."""
 
 
 class Presenter:
@@ -378,7 +388,7 @@ class Presenter:
         """The end of a run, at which the last trials can still be corrected or presented again."""
         yield from self.until_done(Close())
 
-    def _attempt(self, steps: tuple[Step, ...]) -> Generator[Step, Outcome, Outcome]:
+    def _attempt(self, steps: Iterable[Step]) -> Generator[Step, Outcome, Outcome]:
         """One presentation: its last outcome, or the first that breaks it off."""
         for step in steps:
             outcome = yield step

@@ -144,6 +144,18 @@ def is_right(design: DesignConfig, question: QuestionConfig, trial: Trial, answe
     return None if right is None or answer is None else answer == right
 
 
+def is_success(design: DesignConfig, question: QuestionConfig, trial: Trial, answer: AnswerValue) -> bool:
+    """Whether an answer is what a psychometric function rises to: yes, “the comparison is larger”, or what is right.
+
+    `trial` is as it was felt.
+    """
+    if question.kind == "yes-no" and question.correct in (None, "stimulus"):
+        return answer == YES
+    if question.correct == "larger" and trial.odd is not None:
+        return answer == INTERVAL_NAMES[trial.odd]
+    return bool(is_right(design, question, trial, answer))
+
+
 def correct_columns(questions: Mapping[str, QuestionConfig]) -> dict[str, str]:
     """The column of each scored question that says whether its answer was right: `correct` for the first.
 

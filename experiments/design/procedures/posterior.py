@@ -19,7 +19,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import entr
 
 from experiments.design.procedures.psychometric import Shape, Shares, share_felt
 
@@ -202,6 +201,8 @@ def entropy_rule(known: AnswerGrid) -> EntropyRule:
 
 
 def _doubt(share: Shares) -> Shares:
+    from scipy.special import entr  # noqa: PLC0415 - slow, and a run without such a rule needs none of it
+
     return np.asarray(entr(share) + entr(1 - share))
 
 

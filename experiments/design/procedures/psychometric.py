@@ -9,18 +9,18 @@ F is 1/2 at the threshold, and 0.05 and 0.95 a width apart; g is the guess rate,
 from __future__ import annotations
 
 from math import log
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import expit, ndtr, ndtri
 
 Shares = NDArray[np.float64]
 Shape = Literal["normal", "logistic", "gumbel", "reversed-gumbel"]
 
 TAIL = 0.05
 """The width goes from this share to its complement."""
-_NORMAL = 2 * float(ndtri(1 - TAIL))
+_NORMAL = 2 * NormalDist().inv_cdf(1 - TAIL)
 _LOGISTIC = 2 * log(1 / TAIL - 1)
 _GUMBEL = log(-log(TAIL)) - log(-log(1 - TAIL))
 _HALF = log(log(2))
@@ -34,6 +34,8 @@ def share_felt(x: ArrayLike, threshold: ArrayLike, width: ArrayLike, shape: Shap
     >>> share_felt(10.0, 10.0, 4.0, "gumbel").round(3).tolist()
     0.5
     """
+    from scipy.special import expit, ndtr  # noqa: PLC0415 - slow, and whoever only reads a design needs none of it
+
     z = (np.asarray(x, float) - np.asarray(threshold, float)) / np.asarray(width, float)
     match shape:
         case "normal":

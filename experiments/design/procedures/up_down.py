@@ -42,14 +42,18 @@ class LevelRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackEnd:
-    """When a track is over: after so many trials or reversals, whichever comes first; 0 is no limit."""
+    """When a track is over: after so many trials or reversals, whichever comes first; 0 is no limit.
+
+    Reversals end it after the `least` trials at the earliest.
+    """
 
     trials: int = 0
     reversals: int = 0
+    least: int = 0
 
     def reached(self, trials: int, reversals: int) -> bool:
         """Whether it is over."""
-        return 0 < self.trials <= trials or 0 < self.reversals <= reversals
+        return 0 < self.trials <= trials or (0 < self.reversals <= reversals and self.least <= trials)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

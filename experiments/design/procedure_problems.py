@@ -1,0 +1,197 @@
+"""What a procedure's table and the rest of a design do not agree on, in words: what it adapts, asks and can reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+from experiments.design.language import (
+    DRIVEN,
+    FactorConfig,
+    OrderConfig,
+    QuestionConfig,
+    TrialConfig,
+    shown_level,
+)
+from experiments.design.procedures.config import (
+    AdaptiveConfig,
+    KestenConfig,
+    PosteriorConfig,
+    UpDownConfig,
+    starts_of,
+)
+from experiments.design.procedures.up_down import UpDown
+from experiments.design.procedures.walks import Levels, are_even, level_range, walk_rule
+
+_LARGEST_GRID = 6_000_000
+"""Stimuli times places of the parameters' grid: so much is gone through in 20 ms (measured)."""
+
+
+def success_of(questions: Mapping[str, QuestionConfig], named: str | None) -> str | None:
+    """The question whose answers a procedure follows: the one that is named, else the first that can succeed."""
+    able = [name for name, one in questions.items() if one.when == "trial" and has_success(one)]
+    return next((name for name in able if named in (None, name)), None)
+
+
+def has_success(question: QuestionConfig) -> bool:
+    """Whether an answer can be a success: a yes, or what is right."""
+    return question.kind == "yes-no" or question.correct is not None
+
+
+def guess_of(question: QuestionConfig) -> float:
+    """How often who feels nothing succeeds: 0 of yes, and of “larger”, which goes from never to always."""
+    yes = question.kind == "yes-no" and question.correct in (None, "stimulus")
+    return 0.0 if yes or question.correct == "larger" else 1.0 / len(question.named_answers)
+
+
+def procedure_problems(
+    table: AdaptiveConfig,
+    factors: Mapping[str, FactorConfig],
+    order: OrderConfig,
+    trial: TrialConfig,
+    questions: Mapping[str, QuestionConfig],
+) -> Iterator[str]:
+    """Each disagreement, with key, value and what would do."""
+    own = [*_factor_problems(table, factors, order), *_order_problems(table, order, trial)]
+    yield from own
+    name = success_of(questions, table.question)
+    if name is None:
+        yield from _question_problems(table, questions)
+    later = [one for one, question in questions.items() if question.when == "block"]
+    if later:
+        yield f"questions.{later[0]}: when = 'block': a track has no fixed number of trials to ask about; ask at once"
+    if own or name is None:
+        return
+    levels = [tuple(float(one) for one in factors[one].all_levels) for one in table.of]
+    guess = guess_of(questions[name])
+    yield from _start_problems(table, levels[0])
+    match table:
+        case PosteriorConfig():
+            yield from _posterior_problems(table, levels, guess)
+        case UpDownConfig() | KestenConfig():
+            yield from _walk_problems(table, levels[0], guess)
+
+
+def _factor_problems(table: AdaptiveConfig, factors: Mapping[str, FactorConfig], order: OrderConfig) -> Iterator[str]:
+    unknown = [name for name in (*table.of, *table.mixed) if name not in factors]
+    if unknown:
+        yield f"procedure names {unknown[0]!r}, which is no factor; the factors are {', '.join(factors)}"
+        return
+    for name in table.of:
+        yield from _chosen_problems(name, factors[name])
+    for name in (*table.of, *table.mixed):
+        factor = factors[name]
+        if factor.within is not None or factor.between or name in (*order.session, *order.set):
+            yield f"procedure: {name} must vary from trial to trial: not nested, between people, or in order"
+    both = [name for name in table.mixed if name in table.of]
+    if both:
+        yield f"procedure.mixed: {both[0]} is what is chosen, so it cannot be mixed as well; remove it"
+
+
+def _chosen_problems(name: str, factor: FactorConfig) -> Iterator[str]:
+    if isinstance(factor.all_levels[0], str):
+        yield f"procedure.of: the levels of {name} are words; a procedure chooses numbers"
+    elif name not in DRIVEN:
+        yield (
+            f"procedure.of: {name} is set by hand, before the answers are known; a procedure chooses what the "
+            f"command of a shot carries: {' or '.join(DRIVEN)}"
+        )
+    elif len(factor.all_levels) < 2:
+        yield f"factors.{name}.levels: one level leaves nothing to choose; give several"
+    elif list(factor.all_levels) != sorted(factor.all_levels):
+        yield f"factors.{name}.levels: a procedure needs them in order, lowest first"
+
+
+def _order_problems(table: AdaptiveConfig, order: OrderConfig, trial: TrialConfig) -> Iterator[str]:
+    said = {
+        "repetitions": order.repetitions != 1,
+        "trials": order.trials != "random",
+        "balance": order.balance != "session",
+        "longest_run": bool(order.longest_run),
+    }
+    for key in (key for key, wrong in said.items() if wrong):
+        yield f"order.{key} is of constant stimuli; procedure.trials and procedure.interleave say it here: remove it"
+    if trial.kind == "pair":
+        yield "trial.kind = 'pair': all levels are compared with each other; a procedure needs a standard"
+    if trial.compare in table.mixed:
+        yield f"procedure.mixed: {trial.compare} is what intervals differ in; take it out"
+    if trial.intervals > 1 and trial.compare not in table.of:
+        yield f"trial.compare = {trial.compare!r}: compare what the procedure chooses, {' or '.join(table.of)}"
+
+
+def _question_problems(table: AdaptiveConfig, questions: Mapping[str, QuestionConfig]) -> Iterator[str]:
+    rule = "a procedure follows a yes-no, or a choice of which one is right (`correct`), asked after each trial"
+    if table.question is None:
+        yield f"procedure: no answer is a success ({', '.join(questions)}): {rule}"
+    elif table.question in questions:
+        yield f"procedure.question = {table.question!r}: no answer to it is a success: {rule}"
+    else:
+        yield f"procedure.question = {table.question!r} is no question; they are {', '.join(questions)}"
+
+
+def _start_problems(table: AdaptiveConfig, levels: Levels) -> Iterator[str]:
+    for start in starts_of(table):
+        if start is not None and start not in levels:
+            near = sorted(levels, key=lambda level: abs(level - start))[:2]
+            shown = " or ".join(map(shown_level, sorted(near)))
+            yield (
+                f"procedure: the start {start:g} is none of the levels of {table.of[0]}, {levels[0]:g} to "
+                f"{levels[-1]:g}; nearest: {shown}"
+            )
+
+
+def _walk_problems(table: UpDownConfig | KestenConfig, levels: Levels, guess: float) -> Iterator[str]:
+    name = table.of[0]
+    if not are_even(levels):
+        yield f"factors.{name}.levels: steps up and down need them at even distances; give minimum, maximum and grain"
+        return
+    rule = walk_rule(table, levels, levels[0])
+    if rule.target <= guess:
+        yield (
+            f"procedure: the rule settles where {rule.target:.3g} are right, and who feels nothing is right in "
+            f"{guess:.3g}: it would never settle; more right answers in a row (down), or a larger ratio"
+            if isinstance(rule, UpDown)
+            else f"procedure.target = {rule.target:g} is not above {guess:.3g}, which who feels nothing reaches"
+        )
+    if table.step_as == "factor" and levels[0] <= 0:
+        yield f"procedure.step_as = 'factor': {name} has the level {levels[0]:g}; factors need levels above 0"
+    elif isinstance(table, UpDownConfig):
+        yield from _step_problems(table, levels)
+
+
+def _step_problems(table: UpDownConfig, levels: Levels) -> Iterator[str]:
+    """A step that is lost in the grain would hold a track where it is for ever."""
+    within = level_range(levels, table.step_as)
+    for size in table.steps:
+        ways = (size**table.ratio, 1 / size) if within.factors else (size * table.ratio, -size)
+        for level, step in product(levels, ways):
+            goal = within.moved(level, step)
+            if within.low <= goal <= within.high and within.kept(goal) == level:
+                yield (
+                    f"procedure.steps: {size:g} does not leave the level {level:g} of {table.of[0]} (grain "
+                    f"{within.grain:.4g}): the track would stay there; make steps larger, or the grain finer"
+                )
+                return
+
+
+def _posterior_problems(table: PosteriorConfig, levels: Sequence[Levels], guess: float) -> Iterator[str]:
+    first, name = levels[0], table.of[0]
+    if table.scale == "log" and min(one[0] for one in levels) <= 0:
+        yield f"procedure.scale = 'log': levels must be above 0; {name} begins at {first[0]:g}"
+    if len(table.of) == 1 and (table.threshold.maximum < first[0] or table.threshold.minimum > first[-1]):
+        yield (
+            f"procedure.threshold: the prior, {table.threshold.minimum:g} to {table.threshold.maximum:g}, holds none "
+            f"of the levels of {name}, {first[0]:g} to {first[-1]:g}"
+        )
+    if table.guess is not None and guess:
+        yield f"procedure.guess: who feels nothing is right in {guess:.3g} here, by the design; remove the table"
+    if guess + table.lapse.maximum >= 1:
+        yield f"procedure.lapse.maximum = {table.lapse.maximum:g} and the guess rate {guess:.3g} leave nothing to feel"
+    places, parts = 1, (table.threshold, table.width, table.lapse, table.guess, table.trade)
+    for points in (*(part.points for part in parts if part), *map(len, levels)):
+        places *= points
+    if places > _LARGEST_GRID:
+        yield (
+            f"procedure: {places:,} stimuli times values of the parameters are more than {_LARGEST_GRID:,}, which can "
+            "be gone through between two trials; take fewer points or levels"
+        )

@@ -1,0 +1,230 @@
+"""The table `[procedure]` of a design: how the levels of a factor are chosen, from the answers so far.
+
+What a table can tell by itself is checked here; what it must agree on with the rest of the design, in `tracks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from experiments.config.door import InnerShare, Model, once
+from experiments.design.language import ColumnName
+from experiments.design.procedures.psychometric import Shape, Shares
+
+MAX_TRACK = 1_000
+"""More trials than this are in no track."""
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+InARow = Annotated[int, Field(ge=1, le=20)]
+StartLevels = Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
+StepAs = Literal["difference", "factor"]
+
+
+class ConstantConfig(Model):
+    """Constant stimuli: every level is planned beforehand. The default."""
+
+    kind: Literal["constant"]
+
+
+class TracksConfig(Model):
+    """What every adaptive procedure says of its tracks: one for each cell of the other factors that vary."""
+
+    of: Annotated[tuple[ColumnName, ...], Field(min_length=1, max_length=2), AfterValidator(once)]
+    question: ColumnName | None = None
+    trials: Annotated[int, Field(ge=1, le=MAX_TRACK)]
+    least_trials: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
+    mixed: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
+    interleave: bool = True
+    show_level: bool = False
+
+    @model_validator(mode="after")
+    def _least_within_most(self) -> Self:
+        if self.least_trials > self.trials:
+            raise ValueError(f"least_trials = {self.least_trials} is more than trials = {self.trials}: it never stops")
+        return self
+
+
+class UpDownConfig(TracksConfig):
+    """Up-down: so many wrong answers in a row make it easier, so many right ones harder."""
+
+    kind: Literal["up-down"]
+    starts: StartLevels
+    up: InARow = 1
+    down: InARow = 1
+    steps: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=100)]
+    step_as: StepAs = "difference"
+    ratio: Positive = 1.0
+    reversals: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
+
+    @model_validator(mode="after")
+    def _can_turn_so_often(self) -> Self:
+        if self.least_reversal_trials > self.trials:
+            raise ValueError(
+                f"reversals = {self.reversals} takes {self.least_reversal_trials} trials or more, and trials = "
+                f"{self.trials} end a track before: it would never stop there; ask for fewer, or allow more trials"
+            )
+        return self
+
+    @property
+    def least_reversal_trials(self) -> int:
+        """The fewest trials in which a track can turn so often: it goes either way first, and then turns."""
+        one, other = sorted((self.up, self.down))
+        moves = self.reversals + 1 if self.reversals else 0
+        return -(-moves // 2) * one + moves // 2 * other
+
+
+class KestenConfig(TracksConfig):
+    """Accelerated stochastic approximation: steps that shrink with each change of direction."""
+
+    kind: Literal["kesten"]
+    starts: StartLevels
+    first_step: Positive
+    step_as: StepAs = "difference"
+    target: InnerShare
+    reversals: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
+
+    @model_validator(mode="after")
+    def _can_turn_so_often(self) -> Self:
+        if self.reversals >= self.trials:
+            raise ValueError(
+                f"reversals = {self.reversals} takes {self.reversals + 1} trials or more, and trials = {self.trials} "
+                "end a track before: it would never stop there; ask for fewer, or allow more trials"
+            )
+        return self
+
+    @property
+    def least_reversal_trials(self) -> int:
+        """The fewest trials in which a track can turn so often."""
+        return self.reversals + 1 if self.reversals else 0
+
+
+class PriorConfig(Model):
+    """What is thought of a parameter beforehand: values between two ends, alike, or normal about a mean."""
+
+    minimum: float
+    maximum: float
+    points: Annotated[int, Field(ge=1, le=200)]
+    spacing: Literal["even", "log"] = "even"
+    mean: float | None = None
+    sd: Positive | None = None
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        for problem in _prior_problems(self):
+            raise ValueError(problem)
+        return self
+
+    @property
+    def values(self) -> Shares:
+        """The values."""
+        if self.spacing == "log":
+            return np.geomspace(self.minimum, self.maximum, self.points)
+        return np.linspace(self.minimum, self.maximum, self.points)
+
+    @property
+    def weights(self) -> Shares:
+        """How likely each value is beforehand, up to a factor: log-normal where the values are spaced so."""
+        if self.mean is None or self.sd is None:
+            return np.ones(self.points)
+        off = np.log(self.values / self.mean) if self.spacing == "log" else self.values - self.mean
+        return np.asarray(np.exp(-0.5 * (off / self.sd) ** 2))
+
+
+def _prior_problems(prior: PriorConfig) -> Iterator[str]:
+    low, high = prior.minimum, prior.maximum
+    if prior.points == 1 and low != high:
+        yield f"points = 1: one value has minimum = maximum, not {low:g} and {high:g}"
+    if prior.points > 1 and not low < high:
+        yield f"minimum {low:g} and maximum {high:g}: need minimum < maximum, or points = 1"
+    if prior.spacing == "log" and low <= 0:
+        yield f'spacing = "log": minimum {low:g} must be above 0'
+    if (prior.mean is None) != (prior.sd is None):
+        yield "mean and sd go together; give both for a normal prior, or neither for an even one"
+    if prior.mean is not None and not low <= prior.mean <= high:
+        yield f"mean {prior.mean:g} is outside of {low:g} to {high:g}, so the prior excludes it"
+
+
+class PosteriorConfig(TracksConfig):
+    """The posterior of a psychometric function: the next level is the one whose answer tells most."""
+
+    kind: Literal["posterior"]
+    rule: Literal["variance", "entropy"] = "variance"
+    target: Literal["threshold", "width", "both"] = "threshold"
+    shape: Shape = "normal"
+    scale: Literal["linear", "log"] = "linear"
+    threshold: PriorConfig
+    width: PriorConfig
+    lapse: PriorConfig = PriorConfig(minimum=0.0, maximum=0.08, points=5)
+    guess: PriorConfig | None = None
+    trade: PriorConfig | None = None
+    start: float | None = None
+    tracks: Annotated[int, Field(ge=1, le=20)] = 1
+    credible_width: Positive | None = None
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        for problem in _posterior_problems(self):
+            raise ValueError(problem)
+        return self
+
+
+def _posterior_problems(table: PosteriorConfig) -> Iterator[str]:
+    if table.width.minimum <= 0:
+        yield f"width.minimum = {table.width.minimum:g} must be above 0"
+    if table.scale == "log" and table.threshold.minimum <= 0:
+        yield f'scale = "log": threshold.minimum = {table.threshold.minimum:g} must be above 0'
+    yield from _share_problems(table)
+    yield from _target_problems(table)
+    yield from _two_factor_problems(table)
+    low, high = table.threshold.minimum, table.threshold.maximum
+    if table.start is not None and not low <= table.start <= high:
+        yield f"start = {table.start:g} is excluded by the prior of the threshold, {low:g} to {high:g}; widen that"
+
+
+def _share_problems(table: PosteriorConfig) -> Iterator[str]:
+    for name, prior in {"lapse": table.lapse, "guess": table.guess}.items():
+        if prior is not None and not 0 <= prior.minimum <= prior.maximum < 1:
+            yield f"{name}: {prior.minimum:g} to {prior.maximum:g} must be shares, from 0, below 1"
+    if table.guess is not None and table.guess.maximum + table.lapse.maximum >= 1:
+        yield "guess and lapse leave nothing to feel; make their maxima less than 1 together"
+
+
+def _target_problems(table: PosteriorConfig) -> Iterator[str]:
+    wanted = {"threshold": table.target != "width", "width": table.target != "threshold"}
+    for name, asked in wanted.items():
+        if asked and table.rule == "variance" and getattr(table, name).points == 1:
+            yield f"target = {table.target!r}: {name} has one value, so nothing of it can be learnt; give it points"
+    if table.rule == "entropy" and table.target != "threshold":
+        yield f"target = {table.target!r}: the rule entropy asks for all parameters; remove the key"
+
+
+def _two_factor_problems(table: PosteriorConfig) -> Iterator[str]:
+    two = len(table.of) == 2
+    if two and table.rule != "entropy":
+        yield f"of = {', '.join(table.of)}: two factors take the rule entropy, not {table.rule}"
+    if two and table.trade is None:
+        yield "trade is missing: two factors need to know how much of the first one of the second is worth"
+    if not two and table.trade is not None:
+        yield "trade is of two factors; remove it"
+    if two and table.start is not None:
+        yield "start is of one factor; remove it"
+
+
+ProcedureConfig = Annotated[ConstantConfig | UpDownConfig | KestenConfig | PosteriorConfig, Field(discriminator="kind")]
+AdaptiveConfig = UpDownConfig | KestenConfig | PosteriorConfig
+
+
+def least_of_track(table: AdaptiveConfig) -> int:
+    """The fewest trials that a track can take; as many as the most where only those end it."""
+    if isinstance(table, PosteriorConfig):
+        ends = table.credible_width is not None
+        return max(table.least_trials, 1) if ends else table.trials
+    return max(table.least_trials, table.least_reversal_trials) if table.reversals else table.trials
+
+
+def starts_of(table: AdaptiveConfig) -> tuple[float | None, ...]:
+    """The level at which each track of a cell begins; `None` where the rule chooses."""
+    return (table.start,) * table.tracks if isinstance(table, PosteriorConfig) else table.starts
