@@ -17,7 +17,7 @@ from analysis.logs.journals import compared_with, journal_of
 from analysis.logs.names import gun_labels
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan
+from experiments.design.plan import Condition, Plan, Trial
 from experiments.rebuild import began_with
 from experiments.record import journal
 from experiments.record.design_table import columns
@@ -142,7 +142,8 @@ def _check_plan(design: DesignConfig, plan: Plan, rows: Sequence[Mapping[str, ob
     if len(rows) != len(plan.trials):
         raise BadLogError(f"{len(rows)} rows (rule: one for each of the {len(plan.trials)} planned trials)")
     scored = correct_columns(design.questions)
-    for line, (row, trial) in enumerate(zip(rows, plan.trials, strict=True), start=2):
+    for line, (row, planned) in enumerate(zip(rows, plan.trials, strict=True), start=2):
+        trial = planned.with_chosen(_chosen(design, planned, row))
         levels = {name: row[name] for name, _ in trial.levels if name in row}
         wrong = [name for name, level in trial.levels if name in levels and levels[name] != level]
         if wrong or row["trial"] != trial.trial:
@@ -155,6 +156,12 @@ def _check_plan(design: DesignConfig, plan: Plan, rows: Sequence[Mapping[str, ob
                 raise BadLogError(f"{row[column]!r} does not follow from {question} {said!r}", line, column)
 
 
+def _chosen(design: DesignConfig, planned: Trial, row: Mapping[str, object]) -> Condition:
+    """The levels that a procedure chose for a trial, as its row has them."""
+    felt = ((name, row[name]) for name in design.adapted) if planned.track else ()
+    return tuple((name, level) for name, level in felt if isinstance(level, float))
+
+
 def _check_times(design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> None:
     for name in (f"{name}_time_s" for name, question in design.questions.items() if question.named_answers):
         times = [row[name] for row in rows if row[name] is not None]
@@ -163,15 +170,15 @@ def _check_times(design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> 
 
 
 def _check_onsets(rows: Sequence[Mapping[str, object]]) -> None:
-    before: datetime | None = None
+    last: dict[object, datetime | None] = {}
     for line, row in enumerate(rows, start=2):
-        text = str(row["onset_utc"] or "")
+        text, before = str(row["onset_utc"] or ""), last.get(row.get("track"))
         onset = as_moment(text) if text else before
         if onset is None and text:
             raise BadLogError(no_date(text), line, "onset_utc")
         if before and onset and onset < before and CLOCK_SET_BACK not in str(row["flags"] or "").split():
             raise BadLogError(too_early(text), line, "onset_utc")
-        before = onset
+        last[row.get("track")] = onset
 
 
 def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:

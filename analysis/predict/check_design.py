@@ -185,7 +185,9 @@ def _shots(setup: Setup[DesignConfig], plan: Plan) -> list[tuple[Method, int]]:
     design = setup.config
     each = design.trial.max_shots if design.trial.kind == "train" else 1
     felt = Counter[Method]()
-    for trial in plan.trials:
+    highest = tuple((name, design.factors[name].all_levels[-1]) for name in design.adapted)
+    for planned in plan.trials:
+        trial = planned.with_chosen(highest) if planned.track else planned
         for place in range(max(1, len(trial.intervals))):
             if (levels := trial.levels_at(place)) is not None:
                 felt[stimulus(design, setup.gun, levels).parameters] += each

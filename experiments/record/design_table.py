@@ -16,7 +16,7 @@ from experiments.design.language import (
     QuestionConfig,
     shown_level,
 )
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import CHOSEN, Plan, Trial
 from experiments.record import tables
 from experiments.record.tables import Column, Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
@@ -48,6 +48,8 @@ def _places(design: DesignConfig) -> Iterator[Column]:
         yield tables.integer_column("set", "set within the session, from 1", required=True)
     yield from _factors(design, in_set)
     yield tables.integer_column("trial", "trial within the session, from 1, in order of presentation", required=True)
+    if design.adaptive is not None:
+        yield tables.integer_column("track", "adaptive track, from 1; empty of a catch trial")
     if design.trial.catch:
         yield tables.flag_column("stimulus", "1 if there was a stimulus, 0 in a catch trial")
     yield from _factors(design, design.varying)
@@ -58,12 +60,14 @@ def _factors(design: DesignConfig, names: Iterable[str]) -> Iterator[Column]:
         factor, compared = design.factors[name], name == design.trial.compare
         if not (compared and design.trial.kind == "pair"):
             what = "level that was compared" if compared else _MEANINGS.get(name, "level of this factor")
+            what += _CHOSEN if name in design.adapted else ""
             yield _factor(name, factor, what)
         if compared:
             for place in range(1, design.trial.intervals + 1):
                 yield _factor(f"{name}_{place}", factor, f"level in interval {place}; empty if there was no stimulus")
 
 
+_CHOSEN = ", chosen by the answers before; empty if it was not felt"
 _MEANINGS = {
     METHOD_FACTOR: "rendering method, as the config names it",
     DIRECTION_FACTOR: "which way the gun pointed and shot",
@@ -130,41 +134,47 @@ def _presentation(design: DesignConfig) -> Iterator[Column]:
 
 def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]:
     """One row a planned trial, in order; what was not reached is empty."""
-    rows: list[Row] = [
-        {
-            "participant_id": plan.participant_id,
-            "experiment": plan.experiment,
-            "session": trial.session,
-            "set": trial.set,
-            "trial": trial.trial,
-            "stimulus": int(not trial.catch),
-            **dict(trial.levels),
-            **_compared(trial),
-            **_answers(design, trial, events),
-            **exposure_row(events),
-            **_shown(design, events),
-        }
-        for trial, events in by_trial(plan.trials, history).items()
-    ]
+    rows = [_row(plan, design, trial, events) for trial, events in by_trial(plan.trials, history).items()]
     for row in went_back(rows):
         row["flags"] = " ".join(filter(None, (str(row["flags"]), tables.CLOCK_SET_BACK)))
     return rows
 
 
+def _row(plan: Plan, design: DesignConfig, planned: Trial, events: TrialHistory) -> Row:
+    trial = planned.with_chosen(events.chosen)
+    return {
+        "participant_id": plan.participant_id,
+        "experiment": plan.experiment,
+        "session": trial.session,
+        "set": trial.set,
+        "trial": trial.trial,
+        "track": trial.track or None,
+        "stimulus": int(not trial.catch),
+        **dict(trial.levels),
+        **_compared(trial),
+        **_answers(design, trial, events),
+        **exposure_row(events),
+        **_shown(design, events),
+    }
+
+
 def went_back(rows: Iterable[Row]) -> Iterator[Row]:
-    """The rows whose stimulus has an earlier date and time than the last one before: the clock was set back."""
-    before = ""
+    """The rows whose stimulus has an earlier date and time than the last one before: the clock was set back.
+
+    Of adaptive tracks the last one before in the track, as one that goes on after a correction comes late in its set.
+    """
+    before: dict[object, str] = {}
     for row in rows:
         onset = str(row.get("onset_utc") or "")  # of one length, all UTC: earlier sorts first
-        if onset and onset < before:
+        if onset and onset < before.get(row.get("track"), ""):
             yield row
-        before = onset or before
+        before |= {row.get("track"): onset} if onset else {}
 
 
 def _compared(trial: Trial) -> Row:
     """The level of each interval, and the one that was compared."""
     held = {f"{trial.compare}_{place}": level for place, level in enumerate(trial.intervals, start=1)}
-    felt: Row = {name: None if level == EMPTY else level for name, level in held.items()}
+    felt: Row = {name: None if level in (EMPTY, CHOSEN) else level for name, level in held.items()}
     return felt
 
 
@@ -212,6 +222,8 @@ def _shown(design: DesignConfig, events: TrialHistory) -> Row:
     row = presentation(events, Presented if design.trial.kind == "train" else Fired)
     if (fired := events.last(Fired)) is not None:
         row |= {"status": fired.motion}
+    if events.at_edge:
+        row |= {"flags": " ".join(filter(None, (str(row["flags"]), tables.AT_EDGE)))}
     given = events.last(Answered)
     if given is None or given.by != "participant" or given.response_time_s is None:
         return row

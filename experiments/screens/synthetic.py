@@ -9,10 +9,11 @@ from experiments.clock import Clock
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan
+from experiments.design.plan import Condition, Plan
 from experiments.live_run import LiveRun
 from experiments.session import events
 from experiments.session.events import Event
+from experiments.session.history import chosen_levels
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
@@ -78,7 +79,7 @@ class SyntheticScreen:
                 return self._answer(position, step)
             case State.RATING if isinstance(step, Rate):
                 self._clock.sleep(self._config.question_s)
-                return events.Rating(rating=self._observer.rate(step.trial, step.question), by="synthetic")
+                return events.Rating(rating=self._rating(step), by="synthetic")
             case State.DESCRIBING if isinstance(step, Describe):
                 self._clock.sleep(self._config.question_s)
                 return events.Description(text=self._observer.describe(step.trial, step.question), by="synthetic")
@@ -96,10 +97,18 @@ class SyntheticScreen:
 
     def _answer(self, position: Position, step: Ask) -> Event:
         """Answer after the observer's own response time."""
-        answer = self._observer.answer(step.trial, step.question)
+        answer = self._observer.answer(step.trial, step.question, self._chosen(step))
         onset_s = position.onset_s if position.onset_s is not None else self._clock.now()
         self._clock.sleep(onset_s + answer.response_time_s - self._clock.now())
         return events.Answer(response=answer.response, by="synthetic", response_time_s=answer.response_time_s)
+
+    def _rating(self, step: Rate) -> float | None:
+        rating: float | None = self._observer.rate(step.trial, step.question, self._chosen(step))
+        return rating
+
+    def _chosen(self, step: Ask | Rate) -> Condition:
+        """The levels that a procedure chose for what was felt."""
+        return () if self._live is None else chosen_levels(self._live.history, step.trial)
 
     def _next(self, position: Position, step: Present, until_s: float | None) -> Event | None:
         """Say next once the observer has felt enough since the first onset; drawn when the stimulus begins."""

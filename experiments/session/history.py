@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Condition, Plan, Trial
 from experiments.session import steps
 from experiments.session.remarks import EntryCorrected, Remark
 from experiments.session.steps import Asking
@@ -39,6 +39,23 @@ class TrialHistory:
     def last(self, kind: type[Word]) -> Word | None:
         """The last outcome or remark of a kind."""
         return next(reversed(self.all(kind)), None)
+
+    @property
+    def chosen(self) -> Condition:
+        """The levels that a procedure chose, when it was felt last; empty if it was not, or had levels of its own."""
+        felt = self._felt
+        return () if felt is None else felt.chosen
+
+    @property
+    def at_edge(self) -> bool:
+        """Whether those are at the end of what there is."""
+        felt = self._felt
+        return felt is not None and felt.at_edge
+
+    @property
+    def _felt(self) -> steps.FireShot | steps.Present | None:
+        done = (step for step, word in reversed(self.items) if isinstance(word, steps.Fired | steps.Presented))
+        return next((step for step in done if isinstance(step, steps.FireShot | steps.Present)), None)
 
     def entered(self, question: str) -> list[steps.Answered | EntryCorrected]:
         """What was answered to a question, and corrected, in order: the last counts."""
@@ -81,6 +98,14 @@ def trial_at(plan: Plan, history: History, step: steps.Step | None) -> Trial:
     """The trial of a step; if it has none, of the last step that has one; else the first of the plan."""
     backwards = (step, *(one for one, _ in reversed(history)))
     return next((trial for one in backwards if (trial := steps.trial_of(one)) is not None), plan.trials[0])
+
+
+def chosen_levels(history: History, trial: Trial) -> Condition:
+    """The levels that a procedure chose for a trial, when it was felt last; none where it has all of its own."""
+    if not trial.track:
+        return ()
+    fired = (step for step, _ in reversed(history) if isinstance(step, steps.FireShot | steps.Present))
+    return next((step.chosen for step in fired if step.trial == trial), ())
 
 
 def entries(history: History, here: Trial) -> list[Asking]:

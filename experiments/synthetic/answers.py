@@ -76,12 +76,12 @@ class SyntheticParticipant:
         }
         self._given = {name: given for name in design.questions if (given := self._beforehand(name)) is not None}
 
-    def rate(self, trial: Trial, question: str) -> float | None:
+    def rate(self, trial: Trial, question: str, chosen: Condition = ()) -> float | None:
         """The rating, number or rank that a question gets."""
         if self._design.questions[question].kind == "ranking":
             block = [one for one in self._plan.trials if (one.session, one.set) == (trial.session, trial.set)]
             return float(self.rank(question, block)[block.index(trial)])
-        value = self.answer(trial, question).value
+        value = self.answer(trial, question, chosen).value
         return float(value) if isinstance(value, int | float) else None
 
     def describe(self, trial: Trial, question: str) -> str:
@@ -93,14 +93,17 @@ class SyntheticParticipant:
         draws = Stream(self._plan.seed, "exposure", *self._who, str(trial.session), str(trial.trial))
         return self._laws.exposure_s * math.exp(EXPOSURE_SIGMA * draws.normal() - EXPOSURE_SIGMA**2 / 2)
 
-    def answer(self, trial: Trial, name: str) -> GivenAnswer:
-        """The answer to a question about a trial, and its time in whole milliseconds, as a response box gives it."""
+    def answer(self, trial: Trial, name: str, chosen: Condition = ()) -> GivenAnswer:
+        """The answer to a question about a trial, and its time in whole milliseconds, as a response box gives it.
+
+        `chosen` are the levels at which a procedure had it felt.
+        """
         draws = Stream(self._plan.seed, "answer", *self._who, name, str(trial.session), str(trial.trial))
         if name in self._diffusions:
-            decision = decide(self._diffusions[name][trial.levels], draws)
+            decision = decide(self._decision(name, trial.with_chosen(chosen)), draws)
             way = "forward" if decision.upper else "backward"
             return GivenAnswer(value=way, response_time_s=_as_boxed(decision.time_s))
-        value = self._given[name][trial] if name in self._given else self._value(name, trial, draws)
+        value = self._given[name][trial] if name in self._given else self._value(name, trial.with_chosen(chosen), draws)
         return GivenAnswer(value=value, response_time_s=_time_s(self._laws.times, draws))
 
     def rank(self, name: str, trials: Sequence[Trial]) -> tuple[int, ...]:
@@ -168,18 +171,25 @@ class SyntheticParticipant:
         return others[draws.below(len(others))]
 
     def _decisions(self, name: str, law: DiffusionLaw) -> dict[Condition, Diffusion]:
-        """This person's decision in each cell."""
-        model, someone = law.own, person(law.own.people, Stream(self._plan.seed, "person", *self._who))
-        cells = {trial.levels: trial for trial in self._plan.trials}
+        """This person's decision in each cell; where levels are chosen, at the highest, and at others when felt."""
+        highest = tuple((one, self._design.factors[one].all_levels[-1]) for one in self._design.adapted)
+        cells = {(own := trial.with_chosen(highest)).levels: own for trial in self._plan.trials if not trial.catch}
         try:
-            return {
-                levels: own_diffusion(
-                    model, someone, self._percept(levels, law), trial.direction, trial.instruction or NEUTRAL
-                )
-                for levels, trial in cells.items()
-            }
+            return {levels: self._made(law, trial) for levels, trial in cells.items()}
         except ValueError as error:
             raise ConfigError(f"questions.{name}: the numbers make nobody: {error}") from error
+
+    def _decision(self, name: str, trial: Trial) -> Diffusion:
+        """This person's decision on what is felt in a trial."""
+        known, law = self._diffusions[name], self._laws.questions[name]
+        if trial.levels not in known and isinstance(law, DiffusionLaw):
+            known[trial.levels] = self._made(law, trial)
+        return known[trial.levels]
+
+    def _made(self, law: DiffusionLaw, trial: Trial) -> Diffusion:
+        someone = person(law.own.people, Stream(self._plan.seed, "person", *self._who))
+        percept = self._percept(trial.levels, law)
+        return own_diffusion(law.own, someone, percept, trial.direction, trial.instruction or NEUTRAL)
 
     def _percept(self, levels: Condition, law: DiffusionLaw | AppealLaw) -> Percept:
         """What the shot of a cell gives to feel."""

@@ -314,6 +314,10 @@ def _common_problems(design: DesignConfig, question: QuestionConfig, law: Law) -
         yield f".law = {law.law!r}: a question of kind {question.kind!r} has {', '.join(known)}"
     if law.law in _OF_A_RIGHT_ANSWER and question.correct is None:
         yield f".law = {law.law!r}: nothing is right here; give the question `correct`, or use the law shares"
+    chosen = [name for name in getattr(law, "by", ()) if name in design.adapted]
+    if chosen or (design.adapted and isinstance(law, AppealLaw | TableLaw)):
+        what = f"by {chosen[0]}" if chosen else "beforehand"
+        yield f".law = {law.law!r}: levels of {', '.join(design.adapted)} are chosen by the answers, so none is {what}"
     for factor in (*getattr(law, "by", ()), *filter(None, (getattr(law, "factor", None),))):
         if factor not in design.factors:
             yield f" names {factor!r}, which is no factor; they are {', '.join(design.factors)}"

@@ -16,7 +16,7 @@ from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import entered_value, trial_at
+from experiments.session.history import chosen_levels, entered_value, trial_at
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
 from experiments.session.states import EMERGENCY, Position, State
@@ -277,7 +277,8 @@ class Controls:
         step = self.drawn.step
         if self._observer is None or not isinstance(step, Ask):
             return None
-        answer = self._observer.answer(step.trial, step.question)
+        chosen = chosen_levels(self._live.history, step.trial)
+        answer = self._observer.answer(step.trial, step.question, chosen)
         return float(answer.response_time_s) if answer.response == response else None
 
     def _entered(self, press: Press) -> None:

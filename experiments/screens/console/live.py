@@ -21,6 +21,7 @@ from device.words import RecoilError
 from experiments.clock import RealClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.plan import Condition
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
@@ -38,6 +39,7 @@ from experiments.screens.participant.link import ParticipantError, ParticipantLi
 from experiments.screens.participant.messages import Look, NoiseIs
 from experiments.screens.participant.pages import spot_px
 from experiments.screens.participant.stage import WINDOW_TITLE
+from experiments.session.history import chosen_levels
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Rate
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
@@ -322,7 +324,7 @@ class VisualParticipant:
             return
         position, now_s = window.drawn, self._clock.now()
         done = position.serial == self._done and now_s - self._done_s < AGAIN_S
-        if not done and window.live.moment.is_ready(now_s) and not self._thinks(position, now_s):
+        if not done and window.live.moment.is_ready(now_s) and not self._thinks(window, position, now_s):
             self._done, self._done_s = position.serial, now_s
             self._press(window, position)
 
@@ -334,7 +336,7 @@ class VisualParticipant:
         asking = self._console.participant.asking  # only then: what comes later would be done to the next question
         match window.drawn.state:
             case State.RATING if isinstance(step, Rate):
-                rating = self._observer.rate(step.trial, step.question)
+                rating = self._observer.rate(step.trial, step.question, _chosen(window, step))
                 if rating is not None and asking:
                     self._rater.rate(step, rating)
                 return rating is not None
@@ -350,13 +352,15 @@ class VisualParticipant:
         """The observer, which is there once the window is."""
         return self._console.observer
 
-    def _thinks(self, position: Position, now_s: float) -> bool:
+    def _thinks(self, window: ConsoleWindow, position: Position, now_s: float) -> bool:
         """Whether the response time is not over yet."""
         step = position.step
         if position.state is not State.ASKING or not isinstance(step, Ask):
             return False
         onset_s = position.since_s if position.onset_s is None else position.onset_s
-        return bool(now_s < onset_s + self._observer.answer(step.trial, step.question).response_time_s)
+        return bool(
+            now_s < onset_s + self._observer.answer(step.trial, step.question, _chosen(window, step)).response_time_s
+        )
 
     def _press(self, window: ConsoleWindow, position: Position) -> None:
         step, handle = position.step, window.windowHandle()
@@ -368,13 +372,17 @@ class VisualParticipant:
             case State.PREPARING | State.TRAIN:
                 _key(handle, Qt.Key.Key_Space)
             case State.ASKING if isinstance(step, Ask):
-                said = self._observer.answer(step.trial, step.question).response
+                said = self._observer.answer(step.trial, step.question, _chosen(window, step)).response
                 QTest.keyClick(handle, next(one.key for one in step.choices if one.answer == said))  # type: ignore[call-overload] # as below
             case State.RESTING:
                 _key(handle, Qt.Key.Key_E)
                 _type(BREAK_REASON, handle)
             case State.RATING if isinstance(step, Rate):
-                self._rate(self._observer.rate(step.trial, step.question), window, handle)
+                self._rate(
+                    self._observer.rate(step.trial, step.question, _chosen(window, step)),
+                    window,
+                    handle,
+                )
             case State.DESCRIBING | State.INFORMING | State.CLOSING:
                 _key(handle, Qt.Key.Key_Return)
             case _:
@@ -386,6 +394,11 @@ class VisualParticipant:
         else:
             window.fields.rating.clear()
             _type(repr(rating), handle)
+
+
+def _chosen(window: ConsoleWindow, step: Ask | Rate) -> Condition:
+    """The levels that a procedure chose for what was felt."""
+    return () if window.live is None else chosen_levels(window.live.history, step.trial)
 
 
 def _key(window: QWindow, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
