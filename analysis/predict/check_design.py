@@ -76,6 +76,8 @@ class DesignCheck:
     text: tuple[str, ...]
     trials: int
     duration_s: float
+    least_trials: int
+    least_duration_s: float
     break_s: float
     stated_duration_s: float
     seed: int
@@ -103,6 +105,8 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         text=methods_section(design, runs_of_groups(design, setup.gun)),
         trials=planned.trials,
         duration_s=planned.duration_s,
+        least_trials=planned.least_trials,
+        least_duration_s=planned.least_duration_s,
         break_s=planned.break_s,
         stated_duration_s=design.timing.planned_s,
         seed=seed,
@@ -221,7 +225,11 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
     """What a design means, for a person."""
     minutes, stated = found.duration_s / 60, found.stated_duration_s / 60
     a8 = found.exposure
-    duration = f"{minutes:.1f} min planned ({stated:.3g} min stated), of which breaks {found.break_s:g} s"
+    duration = f"{found.trials} trials, {minutes:.1f} min planned"
+    if found.least_trials < found.trials:
+        least = f"{found.least_trials} trials, {found.least_duration_s / 60:.1f} min at the least"
+        duration = f"{least}; {found.trials} trials, {minutes:.1f} min at the most"
+    duration += f" ({stated:.3g} min stated), of which breaks {found.break_s:g} s"
     orders = (
         f"Orders    of sessions, or of the first {_TRIALS_SHOWN} trials where there is one session, as drawn with seed "
         f"{found.seed}; a run without a seed draws its own"
@@ -235,7 +243,7 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
         Section(
             title="Plan",
             items=(
-                f"Duration  {found.trials} trials, {duration}",
+                f"Duration  {duration}",
                 orders,
                 *(f"  {code:10} {' > '.join(order)}" for code, order in found.orders.items()),
                 shaken,

@@ -15,6 +15,8 @@ from experiments.design.language import (
     shown_level,
 )
 from experiments.design.planned import PlannedRun
+from experiments.design.procedures.config import AdaptiveConfig, least_of_track
+from experiments.design.procedures.in_words import end_words, rule_words
 from experiments.design.stimuli import by_hand
 
 
@@ -33,11 +35,14 @@ def methods_section(design: DesignConfig, runs: Sequence[PlannedRun]) -> tuple[s
 
 
 def _factors(design: DesignConfig) -> Iterator[str]:
-    within = [(name, one) for name, one in design.factors.items() if not one.between and len(one.all_levels) > 1]
+    own = {name: one for name, one in design.factors.items() if name not in design.adapted}
+    within = [(name, one) for name, one in own.items() if not one.between and len(one.all_levels) > 1]
     between = [(name, design.factors[name]) for name in design.between]
     constant = [(name, one) for name, one in design.factors.items() if not one.between and len(one.all_levels) == 1]
     if within:
         yield f"{_sentence(within)} varied within participants."
+    if design.adaptive is not None:
+        yield from _chosen(design, design.adaptive)
     if between:
         yield f"{_sentence(between)} varied between participants."
     if constant:
@@ -45,6 +50,17 @@ def _factors(design: DesignConfig) -> Iterator[str]:
     hands = [name for name in by_hand(design) if len(design.factors[name].all_levels) > 1]
     if hands:
         yield f"The experimenter set {_listed(hands)} by hand."
+
+
+def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
+    levels = [tuple(float(level) for level in design.factors[name].all_levels) for name in table.of]
+    ranges = [
+        f"{factor_words(name)} ({len(some)} levels, {some[0]:g} to {some[-1]:g})"
+        for name, some in zip(table.of, levels, strict=True)
+    ]
+    text = _listed(ranges)
+    was = "was" if len(ranges) == 1 else "were"
+    yield f"{text[0].upper() + text[1:]} {was} chosen after each answer, {rule_words(table, levels)}."
 
 
 def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
@@ -115,6 +131,9 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
         blocked = _listed([factor_words(name) for name in order.session])
         yield f"There were {_counts(sessions)} sessions, each of one {blocked}, {_HOW[order.sessions]}."
     where = "In each session" if max(sessions) > 1 else "In the session"
+    if design.adaptive is not None:
+        yield _tracks(design, design.adaptive, where, each)
+        return
     times = {1: "once", 2: "twice"}.get(order.repetitions, f"{order.repetitions} times")
     yield f"{where} every condition came {times}, {_HOW[order.trials]}: {_counts(each)} trials{_sets(design, each)}."
     if INSTRUCTION_FACTOR in design.factors:
@@ -123,6 +142,15 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
         yield f"{_listed([factor_words(name) for name in order.set]).capitalize()} was constant in a set."
     for name, most in order.longest_run.items():
         yield f"No level of {factor_words(name)} came more than {most} times in a row."
+
+
+def _tracks(design: DesignConfig, table: AdaptiveConfig, where: str, each: Sequence[int]) -> str:
+    """How many tracks there were, how long each was, and in which order."""
+    tracks = sum(trials - design.trial.catch for trials in each) // len(each) // table.trials
+    how = "one after another in random order" if not table.interleave else "interleaved in random order"
+    some = f"was one track {end_words(table)}" if tracks == 1 else f"were {tracks} tracks {end_words(table)}, {how}"
+    most = "" if least_of_track(table) == table.trials else "at most "
+    return f"{where} there {some}: {most}{_counts(each)} trials{_sets(design, each)}."
 
 
 def _told(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:
@@ -212,4 +240,9 @@ def _rests(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     if breaks.between_sessions_s and any(run.sessions > 1 for run in runs):
         yield f"Sessions were {breaks.between_sessions_s:g} s apart."
     trials, minutes = _counts([run.trials for run in runs]), _counts([run.duration_s for run in runs], 60.0)
-    yield f"The {trials} trials took {minutes} min as planned."
+    if all(run.least_trials == run.trials for run in runs):
+        yield f"The {trials} trials took {minutes} min as planned."
+    else:
+        least = _counts([run.least_duration_s for run in runs], 60.0)
+        fewest = _counts([run.least_trials for run in runs])
+        yield f"A run took {fewest} trials and {least} min at the least, {trials} trials and {minutes} min at the most."

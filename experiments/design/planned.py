@@ -184,7 +184,9 @@ def trial_text(design: DesignConfig, trial: Trial) -> str:
     if trial.catch:
         return "catch"
     varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1 and name != trial.compare]
-    return " ".join(filter(None, (levels_text(trial, varied), " – ".join(map(shown_level, trial.intervals))))) or "shot"
+    track = f"track {trial.track}" if trial.track else ""
+    held = " – ".join(map(shown_level, trial.intervals))
+    return " ".join(filter(None, (track, levels_text(trial, varied), held))) or "shot"
 
 
 _MUCH = 1.5

@@ -1,0 +1,224 @@
+"""Adaptive runs with corrections and repeats at random moments, and what their next levels must be, told plainly."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from device import open_gun
+from experiments.clock import Clock, VirtualClock
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan, Trial
+from experiments.design.procedures.choosing import Choice, Track, tracks_of_cell
+from experiments.design.stimuli import stimuli_of
+from experiments.live_run import LiveRun
+from experiments.record import storage
+from experiments.record.journal import Contents, Journal, contents_of, read_journal
+from experiments.record.replay import RunPosition, replay
+from experiments.record.replay import history as told_by
+from experiments.runner import Desk, carry_out
+from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of
+from experiments.session import events
+from experiments.session.design_session import design_session
+from experiments.session.history import GrowingHistory, History
+from experiments.session.remarks import EntryCorrected, Remark
+from experiments.session.states import Position, State
+from experiments.session.steps import (
+    STEP,
+    Answered,
+    Failed,
+    FireShot,
+    Interrupted,
+    Outcome,
+    Repeated,
+    Step,
+    step_record,
+)
+from experiments.tasks.questions import AnswerValue
+from tests.designs import changed
+
+_EVEN = {"maximum": 18.0, "minimum": 6.0}
+_GRIDS = {
+    "threshold": {"points": 9, **_EVEN},
+    "width": {"points": 3, "minimum": 2.0, "maximum": 12.0},
+    "lapse": {"points": 2, "minimum": 0.0, "maximum": 0.04},
+}
+_STARTS = {"starts": [16.0, 10.0]}
+_TRACKS = {
+    "posterior": {"tracks": 2, "trials": 8, **_GRIDS},
+    "posterior-ends": {"tracks": 2, "trials": 10, "credible_width": 5.0, "least_trials": 3, **_GRIDS},
+    "up-down": {
+        "kind": "up-down",
+        "trials": 12,
+        "reversals": 3,
+        "down": 2,
+        "starts": [16.0, 10.0],
+        "steps": [2.0, 1.0],
+    },
+    "kesten": {
+        "kind": "kesten",
+        "trials": 9,
+        "target": 0.75,
+        "starts": [16.0, 10.0],
+        "first_step": 8.0,
+        "reversals": 4,
+    },
+}
+KINDS = tuple(_TRACKS)
+
+
+def adaptive(kind: str, sets: int = 2, **more: Any) -> Setup[DesignConfig]:
+    """The shipped threshold with short tracks of a kind, in a few sets."""
+    setup = changed("threshold")
+    tables = setup.config.model_dump(mode="json") | more
+    common = {"kind": "posterior", "of": ["voltage_V"], "mixed": ["direction"]}
+    tables |= {"procedure": common | _TRACKS[kind], "order": {"sets": sets}}
+    tables["factors"]["voltage_V"]["levels"] = {"grain": 1.0, **_EVEN}
+    return replace(setup, config=DesignConfig.model_validate(tables, strict=False))
+
+
+class UndoingScreen(SyntheticScreen):
+    """A synthetic participant whose experimenter corrects and repeats at random, wherever that may be done."""
+
+    def __init__(self, config: Any, observer: Any, clock: Clock, seed: int, share: float) -> None:
+        super().__init__(config, observer, clock)
+        self._random, self._share = random.Random(seed), share
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        open_for = (State.PREPARING, State.SETTING, State.ASKING, State.RESTING, State.CLOSING)
+        if position.state in open_for and self._live is not None and self._random.random() < self._share:
+            self._meddle()
+            position = self._live.position
+        if position.state is not State.SAVING:
+            super().act(position, until_s)
+
+    def _meddle(self) -> None:
+        live, draw = self._live, self._random
+        assert live is not None
+        if draw.random() < 0.2 and live.offer(events.Repeat(reason="spoiled")):
+            return
+        for _ in range(draw.randint(1, 3)):
+            live.offer(events.Undo())
+        if live.position.correcting is not None:
+            live.offer(events.Correct(value=draw.choice(["forward", "backward"])))
+        if live.position.state is State.CORRECTING:
+            live.offer(events.Leave())
+
+
+def undone_run(setup: Setup[DesignConfig], plan: Plan, folder: Path, seed: int, share: float) -> Contents:
+    """The journal of a whole run of a plan, with so many corrections and repeats."""
+    clock, path = VirtualClock(), folder / f"sub-P01_task-threshold-{seed}_journal.jsonl"
+    told: GrowingHistory = []
+    storage.make_folder(folder)
+    with Journal.create(path, clock) as journal:
+        heads = {"plan": plan.record(), "plan_sha256": plan.sha256()}
+        journal.append("run", **heads, setup=setup.record(), setup_sha256=setup.sha256())
+        going, stimuli = design_session(plan, setup, told), stimuli_of(setup.config, setup.gun)
+        gun = open_gun("simulated", stimuli.methods, clock=clock.now)
+        screen = UndoingScreen(setup.config, synthetic_participant_of(setup, plan), clock, seed, share)
+        live = LiveRun(plan=plan, gun=gun, journal=journal, clock=clock, screen=screen, guard_s=0.0, told=told)
+        first = next(going)
+        journal.append("step", body=step_record(first))
+        screen.begin(live)
+        carry_out(going, Desk(live=live, gun_name="simulated", stimuli=stimuli), RunPosition(step=first))
+    return read_journal(path)
+
+
+def counted(history: History, plan: Plan, number: int) -> list[tuple[float, bool]]:
+    """The answers of a track that count, in order: to which level, and whether it was right."""
+    found: list[tuple[int, float, bool]] = []
+    for trial in (one for one in plan.trials if one.track == number):
+        answer = _that_counts(history, trial)
+        if answer is not None:
+            place, level, said = answer
+            found.append((place, level, said == trial.direction))
+    return [(level, right) for _, level, right in sorted(found)]
+
+
+def _that_counts(history: History, trial: Trial) -> tuple[int, float, AnswerValue] | None:
+    """Where the answer to a trial stands, to what it was given, and what it says: of none that was presented again."""
+    last = max((at for at, (step, word) in enumerate(history) if _presents_again(step, word, trial)), default=-1)
+    own = [(at, step, word) for at, (step, word) in enumerate(history) if at > last and _about(step, word) == trial]
+    said = [(at, word.value) for at, _, word in own if isinstance(word, Answered | EntryCorrected)]
+    given = [at for at, _, word in own if isinstance(word, Answered)]
+    if not given:
+        return None
+    (level,) = {dict(step.chosen)["voltage_V"] for _, step, _ in own if isinstance(step, FireShot)}
+    return given[0], float(level), said[-1][1]
+
+
+def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
+    return getattr(word if step is None else step, "trial", None)
+
+
+def _presents_again(step: Step | None, word: Outcome | Remark, trial: Trial) -> bool:
+    if isinstance(word, Repeated):
+        return word.trial == trial
+    return isinstance(word, Failed | Interrupted) and _about(step, word) == trial
+
+
+def expected(setup: Setup[DesignConfig], plan: Plan, history: History, number: int) -> Choice | None:
+    """The levels that come next in a track: of one that begins anew, and is given its answers at once."""
+    table = setup.config.adaptive
+    assert table is not None
+    levels = tuple(float(one) for one in setup.config.factors["voltage_V"].all_levels)
+    track: Track = tracks_of_cell(table, [levels], 0.5)[number - 1]
+    for level, right in counted(history, plan, number):
+        track = track.after((level,), success=right)
+    return None if track.over else track.choice()
+
+
+def check_levels(setup: Setup[DesignConfig], contents: Contents) -> int:
+    """Every level of a journal is what its answers so far call for, as they counted then; how many there are."""
+    plan, checked = contents.plan, 0
+    for step, told in steps_with_history(contents):
+        choice = expected(setup, plan, told, step.trial.track)
+        assert choice is not None
+        assert (dict(step.chosen)["voltage_V"], step.at_edge) == (choice.levels[0], choice.at_edge)
+        checked += 1
+    return checked
+
+
+def check_ends(setup: Setup[DesignConfig], contents: Contents) -> None:
+    """A run ends when every track is over, by its answers as they count in the end."""
+    told = told_by(contents)
+    for number in {trial.track for trial in contents.plan.trials}:
+        assert expected(setup, contents.plan, told, number) is None
+
+
+def steps_with_history(contents: Contents) -> Iterator[tuple[FireShot, History]]:
+    """Each shot that was announced, with all that lies before it in the journal."""
+    for at, line in enumerate(contents.records):
+        if line.kind == "step" and '"fire"' in json.dumps(line.body):
+            step = STEP.validate_python(line.body)
+            assert isinstance(step, FireShot)
+            yield step, told_by(replace(contents, records=contents.records[:at]))
+
+
+def step_after_cut(setup: Setup[DesignConfig], contents: Contents, data: bytes) -> Step | None:
+    """Where a run stands of which the journal has so many bytes."""
+    told: GrowingHistory = []
+    cut = contents_of(contents.path, data)
+    assert cut is not None
+    return replay(design_session(cut.plan, setup, told), cut, told).step
+
+
+def step_after_that(contents: Contents, whole: int) -> Step | None:
+    """The step at which the unbroken run stood after so many records: the last one if it was not done, else the next.
+
+    `None`, too, where a correction comes before the next one: the run that was cut off never heard of it.
+    """
+    kinds = [line.kind for line in contents.records[:whole] if line.kind in ("step", "outcome")]
+    if kinds and kinds[-1] == "step":
+        return STEP.validate_python([line for line in contents.records[:whole] if line.kind == "step"][-1].body)
+    for line in contents.records[whole:]:
+        if line.kind == "step":
+            return STEP.validate_python(line.body)
+        if line.kind == "remark" and '"corrected"' in json.dumps(line.body):
+            return None
+    return None

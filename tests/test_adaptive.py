@@ -1,0 +1,105 @@
+"""Levels that are chosen by the answers so far: with corrections, repeats, ends, cuts and resumption."""
+
+from __future__ import annotations
+
+import csv
+import random
+from pathlib import Path
+
+import pytest
+
+from experiments.clock import VirtualClock
+from experiments.design.planning import plan_of
+from experiments.rebuild import table
+from experiments.record.journal import Contents
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
+from experiments.session.steps import step_record
+from tests.adaptive_runs import (
+    KINDS,
+    adaptive,
+    check_ends,
+    check_levels,
+    step_after_cut,
+    step_after_that,
+    undone_run,
+)
+
+SETUPS = {kind: adaptive(kind) for kind in KINDS}
+
+
+@pytest.fixture(scope="module")
+def undone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Contents]]:
+    """Runs with corrections and repeats at about every other trial, some of each kind."""
+    folder = tmp_path_factory.mktemp("undone")
+    return {
+        kind: [
+            undone_run(setup, plan_of(setup.config, "P01", seed), folder / kind, seed, share=0.4) for seed in range(4)
+        ]
+        for kind, setup in SETUPS.items()
+    }
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_after_corrections_and_repeats_the_next_level_is_as_if_the_answers_had_been_given_at_once(
+    kind: str, undone: dict[str, list[Contents]]
+) -> None:
+    assert sum(check_levels(SETUPS[kind], contents) for contents in undone[kind]) > 40
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_ends_when_every_track_is_over_by_the_answers_as_they_count_in_the_end(
+    kind: str, undone: dict[str, list[Contents]]
+) -> None:
+    for contents in undone[kind]:
+        check_ends(SETUPS[kind], contents)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_that_is_cut_off_anywhere_stands_where_the_unbroken_one_stood(
+    kind: str, undone: dict[str, list[Contents]]
+) -> None:
+    contents = undone[kind][0]
+    data, draw = contents.path.read_bytes(), random.Random(1)
+    for at in (draw.randrange(data.index(b"\n") + 1, len(data)) for _ in range(10)):
+        wanted = step_after_that(contents, data[:at].count(b"\n"))
+        step = step_after_cut(SETUPS[kind], contents, data[:at])
+        if wanted is not None:
+            assert step is not None
+            assert step_record(step) == step_record(wanted)
+
+
+def test_a_run_without_corrections_asks_no_more_trials_than_its_tracks_need(tmp_path: Path) -> None:
+    setup = SETUPS["up-down"]
+    done = run(_request(setup, tmp_path), synthetic_screen, VirtualClock())
+    with done.place.table.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 24
+    for number in ("1", "2"):
+        track = [row for row in rows if row["track"] == number]
+        felt = [row for row in track if row["response"]]
+        assert track[: len(felt)] == felt
+        assert all(row["voltage_V"] and row["attempts"] == "1" for row in felt)
+        assert not any(row["voltage_V"] or row["onset_utc"] for row in track[len(felt) :])
+    assert any(not row["response"] for row in rows)
+
+
+def test_the_same_seed_makes_the_same_levels_and_the_table_is_made_again_byte_for_byte(
+    undone: dict[str, list[Contents]], tmp_path: Path
+) -> None:
+    setup, contents = SETUPS["posterior"], undone["posterior"][1]
+    again = undone_run(setup, contents.plan, tmp_path, 1, share=0.4)
+    assert _levels(again) == _levels(contents)
+    assert table(contents) == table(contents)
+
+
+def _request(setup, results: Path) -> RunRequest:
+    return RunRequest(setup=setup, participant_id="P01", results=results, seed=4)
+
+
+def _levels(contents: Contents) -> list[object]:
+    return [
+        line.body["chosen"]
+        for line in contents.records
+        if line.kind == "step" and isinstance(line.body, dict) and line.body["kind"] == "fire"
+    ]
