@@ -21,8 +21,9 @@ from experiments.record import storage
 from experiments.record.journal import Contents, Journal, contents_of, read_journal
 from experiments.record.replay import RunPosition, replay
 from experiments.record.replay import history as told_by
+from experiments.run import RunRequest, run
 from experiments.runner import Desk, carry_out
-from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of
+from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
 from experiments.session import events
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory, History
@@ -30,7 +31,7 @@ from experiments.session.remarks import EntryCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import (
     STEP,
-    Answered,
+    Ask,
     Failed,
     FireShot,
     Interrupted,
@@ -39,8 +40,10 @@ from experiments.session.steps import (
     Step,
     step_record,
 )
+from experiments.study.folders import place
+from experiments.synthetic.laws import SyntheticAnswers
 from experiments.tasks.questions import AnswerValue
-from tests.designs import changed
+from tests.designs import changed, merged
 
 _EVEN = {"maximum": 18.0, "minimum": 6.0}
 _GRIDS = {
@@ -79,7 +82,12 @@ def adaptive(kind: str, sets: int = 2, **more: Any) -> Setup[DesignConfig]:
     common = {"kind": "posterior", "of": ["voltage_V"], "mixed": ["direction"]}
     tables |= {"procedure": common | _TRACKS[kind], "order": {"sets": sets}}
     tables["factors"]["voltage_V"]["levels"] = {"grain": 1.0, **_EVEN}
-    return replace(setup, config=DesignConfig.model_validate(tables, strict=False))
+    sure = {"kind": "rating", "text": "How sure?", "minimum": 0.0, "maximum": 4.0, "grain": 1.0}
+    tables["questions"]["sure"] = sure  # a trial that breaks off here was answered, and is presented again
+    assert setup.laws is not None
+    laws = merged(setup.laws.model_dump(), {"questions": {"sure": {"law": "ratings", "mean": {"all": 2.0}}}})
+    config = DesignConfig.model_validate(tables, strict=False)
+    return replace(setup, config=config, laws=SyntheticAnswers.model_validate(laws))
 
 
 class UndoingScreen(SyntheticScreen):
@@ -90,7 +98,7 @@ class UndoingScreen(SyntheticScreen):
         self._random, self._share = random.Random(seed), share
 
     def act(self, position: Position, until_s: float | None) -> None:
-        open_for = (State.PREPARING, State.SETTING, State.ASKING, State.RESTING, State.CLOSING)
+        open_for = (State.PREPARING, State.SETTING, State.ASKING, State.RATING, State.RESTING, State.CLOSING)
         if position.state in open_for and self._live is not None and self._random.random() < self._share:
             self._meddle()
             position = self._live.position
@@ -102,12 +110,21 @@ class UndoingScreen(SyntheticScreen):
         assert live is not None
         if draw.random() < 0.2 and live.offer(events.Repeat(reason="spoiled")):
             return
-        for _ in range(draw.randint(1, 3)):
+        for _ in range(draw.randint(1, 5)):
             live.offer(events.Undo())
-        if live.position.correcting is not None:
+        if isinstance(live.position.correcting, Ask):
             live.offer(events.Correct(value=draw.choice(["forward", "backward"])))
         if live.position.state is State.CORRECTING:
             live.offer(events.Leave())
+
+
+def cut_and_resumed(setup: Setup[DesignConfig], contents: Contents, at: int, folder: Path) -> Contents:
+    """The journal of a run that was cut off there, and went on without a correction."""
+    where = place(folder, "P01", "threshold")
+    storage.make_folder(where.folder)
+    where.journal.write_bytes(contents.path.read_bytes()[:at])
+    request = RunRequest(setup=setup, participant_id="P01", results=folder, again="resume")
+    return read_journal(run(request, synthetic_screen, VirtualClock()).place.journal)
 
 
 def undone_run(setup: Setup[DesignConfig], plan: Plan, folder: Path, seed: int, share: float) -> Contents:
@@ -144,8 +161,8 @@ def _that_counts(history: History, trial: Trial) -> tuple[int, float, AnswerValu
     """Where the answer to a trial stands, to what it was given, and what it says: of none that was presented again."""
     last = max((at for at, (step, word) in enumerate(history) if _presents_again(step, word, trial)), default=-1)
     own = [(at, step, word) for at, (step, word) in enumerate(history) if at > last and _about(step, word) == trial]
-    said = [(at, word.value) for at, _, word in own if isinstance(word, Answered | EntryCorrected)]
-    given = [at for at, _, word in own if isinstance(word, Answered)]
+    said = [(at, word.value) for at, step, word in own if _asked(step, word) == "response"]
+    given = [at for at, step, word in own if isinstance(step, Ask)]
     if not given:
         return None
     (level,) = {dict(step.chosen)["voltage_V"] for _, step, _ in own if isinstance(step, FireShot)}
@@ -154,6 +171,10 @@ def _that_counts(history: History, trial: Trial) -> tuple[int, float, AnswerValu
 
 def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
     return getattr(word if step is None else step, "trial", None)
+
+
+def _asked(step: Step | None, word: Outcome | Remark) -> str:
+    return word.question if isinstance(word, EntryCorrected) else getattr(step, "question", "")
 
 
 def _presents_again(step: Step | None, word: Outcome | Remark, trial: Trial) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.design.planning import plan_of
 from experiments.rebuild import table
-from experiments.record.journal import Contents
+from experiments.record.journal import Contents, Record
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import step_record
@@ -20,6 +21,7 @@ from tests.adaptive_runs import (
     adaptive,
     check_ends,
     check_levels,
+    cut_and_resumed,
     step_after_cut,
     step_after_that,
     undone_run,
@@ -34,7 +36,7 @@ def undone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Contents]
     folder = tmp_path_factory.mktemp("undone")
     return {
         kind: [
-            undone_run(setup, plan_of(setup.config, "P01", seed), folder / kind, seed, share=0.4) for seed in range(4)
+            undone_run(setup, plan_of(setup.config, "P01", seed), folder / kind, seed, share=0.4) for seed in range(2)
         ]
         for kind, setup in SETUPS.items()
     }
@@ -44,7 +46,7 @@ def undone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Contents]
 def test_after_corrections_and_repeats_the_next_level_is_as_if_the_answers_had_been_given_at_once(
     kind: str, undone: dict[str, list[Contents]]
 ) -> None:
-    assert sum(check_levels(SETUPS[kind], contents) for contents in undone[kind]) > 40
+    assert sum(check_levels(SETUPS[kind], contents) for contents in undone[kind]) > 20
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -67,6 +69,30 @@ def test_a_run_that_is_cut_off_anywhere_stands_where_the_unbroken_one_stood(
         if wanted is not None:
             assert step is not None
             assert step_record(step) == step_record(wanted)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_that_was_cut_off_and_goes_on_chooses_by_the_answers_that_count(
+    kind: str, undone: dict[str, list[Contents]], tmp_path: Path
+) -> None:
+    contents = undone[kind][1]
+    size = contents.path.stat().st_size
+    at = random.Random(KINDS.index(kind)).randrange(contents.path.read_bytes().index(b"\n") + 1, size)
+    whole = cut_and_resumed(SETUPS[kind], contents, at, tmp_path)
+    assert check_levels(SETUPS[kind], whole) > 10
+    check_ends(SETUPS[kind], whole)
+
+
+def test_a_trial_that_breaks_off_after_its_answer_is_felt_again_at_the_same_level(
+    undone: dict[str, list[Contents]], tmp_path: Path
+) -> None:
+    contents = undone["up-down"][0]
+    rated = next(at for at, line in enumerate(contents.records) if _is_step(line, "rate"))
+    lines = contents.path.read_bytes().splitlines(keepends=True)
+    whole = cut_and_resumed(SETUPS["up-down"], contents, sum(map(len, lines[: rated + 1])), tmp_path)
+    before, again = _levels(replace(whole, records=whole.records[:rated])), _levels(whole)
+    assert again[len(before)] == before[-1]
+    assert check_levels(SETUPS["up-down"], whole) > 10
 
 
 def test_a_run_without_corrections_asks_no_more_trials_than_its_tracks_need(tmp_path: Path) -> None:
@@ -98,8 +124,8 @@ def _request(setup, results: Path) -> RunRequest:
 
 
 def _levels(contents: Contents) -> list[object]:
-    return [
-        line.body["chosen"]
-        for line in contents.records
-        if line.kind == "step" and isinstance(line.body, dict) and line.body["kind"] == "fire"
-    ]
+    return [line.body["chosen"] for line in contents.records if _is_step(line, "fire")]
+
+
+def _is_step(line: Record, kind: str) -> bool:
+    return line.kind == "step" and isinstance(line.body, dict) and line.body["kind"] == kind
