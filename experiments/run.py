@@ -290,9 +290,14 @@ def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, obj
         "provenance": provenance(),
         "gun": asdict(gun.identify()),
         "clock": clock.name,
-        "experimenter_knows": ["direction", *dampers, *by_hand(setup.config)],
+        "experimenter_knows": ["direction", *dampers, *by_hand(setup.config), *_shown_levels(setup.config)],
         **({"preregistration_sha256": frozen} if frozen else {}),
     }
+
+
+def _shown_levels(design: DesignConfig) -> tuple[str, ...]:
+    """The factors whose levels the experimenter is shown, once they were felt."""
+    return design.adapted if design.adaptive is not None and design.adaptive.show_level else ()
 
 
 def _begin(

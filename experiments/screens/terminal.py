@@ -122,7 +122,7 @@ class TerminalScreen:
             case State.TRAIN if position.onset_s is not None:
                 return "\n  Enter when the participant says next: "
             case State.ASKING if isinstance(step, Ask):
-                about = f"{texts.ordinal(self._plan, step.trial)}. " if step.later else ""
+                about = f"{texts.ordinal(self._plan, step.trial)}. " if step.later else self._level(step)
                 return f"\n  {about}{step.text} {_keys(step)}: "
             case State.RATING if isinstance(step, Rate):
                 none = "; `none` for no answer" if step.may_be_skipped else ""
@@ -146,7 +146,14 @@ class TerminalScreen:
     def _head(self, step: Prepare) -> str:
         told = self._live.history if self._live else ()
         place, again = texts.place_text(self._plan, step.trial), texts.again_text(told, step)
-        return f"\n{place}.{f' {again}' if again else ''}{texts.read_out_text(self._plan, step)}"
+        track = texts.track_text(self._plan, told, step.trial)
+        said = "".join(f" {one}" for one in (f"{track}." if track else "", again) if one)
+        return f"\n{place}.{said}{texts.read_out_text(self._plan, step)}"
+
+    def _level(self, step: Ask) -> str:
+        """The levels that a procedure chose, where the experimenter may know them."""
+        text = texts.chosen_text(self._live.history if self._live else (), step.trial)
+        return f"({text}) " if text else ""
 
     def _correction(self, entry: Asking) -> str:
         told = self._live.history if self._live else ()

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import unicodedata
 
-from experiments.design.language import LARGEST_NUMBER
+from experiments.design.language import LARGEST_NUMBER, shown_level
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
-from experiments.session.history import History, asked_before, entered_value, is_attempt, of_one_set
+from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
 from experiments.tasks.questions import AnswerValue
@@ -33,13 +33,29 @@ def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
 def place_text(plan: Plan, trial: Trial) -> str:
     """Where a trial stands: in its session, set and run."""
     in_session = [other for other in plan.trials if other.session == trial.session]
-    where = f"Trial {trial.trial} of {len(in_session)}"
+    most = "at most " if any(other.track for other in in_session) else ""  # a track may be over sooner
+    where = f"Trial {trial.trial} of {most}{len(in_session)}"
     sessions, sets = plan.trials[-1].session, in_session[-1].set
     return (
         where
         if sessions == sets == 1
         else f"{where} · set {trial.set} of {sets} · session {trial.session} of {sessions}"
     )
+
+
+def track_text(plan: Plan, told: History, trial: Trial) -> str:
+    """How far the adaptive track of a trial is, which may be over sooner; empty of a trial without one."""
+    if not trial.track:
+        return ""
+    own = {other for other in plan.trials if other.track == trial.track}
+    return f"Track {trial.track}: {len(answered(told) & own)} of at most {len(own)} trials"
+
+
+def chosen_text(told: History, trial: Trial) -> str:
+    """The levels that a procedure chose for a trial, once they were felt, if the experimenter may know them."""
+    felt = next((step for step, _ in reversed(told) if isinstance(step, steps.FireShot | steps.Present)), None)
+    known = felt.chosen if felt is not None and felt.shown and felt.trial == trial else ()
+    return ", ".join(f"{name} = {shown_level(level)}" for name, level in known)
 
 
 def short_place(trial: Trial, here: Trial) -> str:

@@ -99,8 +99,8 @@ def break_s(design: DesignConfig, before: Trial, trial: Trial) -> float:
     return float(breaks.between_sets_s if before.session == trial.session else breaks.between_sessions_s)
 
 
-def end_text(left_s: float, now: datetime) -> str:
-    """When a run ends, as a time of day: to five minutes if it is far.
+def end_text(left_s: float, now: datetime, *, at_most: bool = False) -> str:
+    """When a run ends, as a time of day: to five minutes if it is far. `at_most`: adaptive tracks may be over sooner.
 
     >>> end_text(3000.0, datetime(2026, 11, 22, 13, 43, 20)), end_text(300.0, datetime(2026, 11, 22, 13, 43, 20))
     ('about 14:35', 'about 13:48')
@@ -108,7 +108,7 @@ def end_text(left_s: float, now: datetime) -> str:
     end, grain_s = now + timedelta(seconds=left_s), 300 if left_s > ROUGH_S else 60
     midnight = end.replace(hour=0, minute=0, second=0, microsecond=0)
     grains = round((end - midnight).total_seconds() / grain_s)
-    return f"about {midnight + timedelta(seconds=grains * grain_s):%H:%M}"
+    return f"{'by' if at_most else 'about'} {midnight + timedelta(seconds=grains * grain_s):%H:%M}"
 
 
 def clock_text(seconds: float) -> str:

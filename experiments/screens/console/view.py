@@ -173,8 +173,10 @@ def where_text(seen: Seen) -> str:
     """Where the run stands: trial, set, session; nowhere, if it ended before it began."""
     if seen.ended is not None and seen.position.step is None:
         return ""
-    place = texts.place_text(seen.about.plan, seen.here)
-    return f"{place}{method_text(seen.about, seen.here)}" if seen.about.plan.trials[-1].session > 1 else place
+    place, plan = texts.place_text(seen.about.plan, seen.here), seen.about.plan
+    method = method_text(seen.about, seen.here) if plan.trials[-1].session > 1 else ""
+    track = texts.track_text(plan, seen.told, seen.here), texts.chosen_text(seen.told, seen.here)
+    return " · ".join(filter(None, (f"{place}{method}", *track)))
 
 
 def bands(seen: Seen) -> list[tuple[str, str]]:
