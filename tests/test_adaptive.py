@@ -16,6 +16,7 @@ from experiments.record.journal import Contents, Record
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import step_record
+from tests.adaptive_kills import killed_until_done, unbroken
 from tests.adaptive_runs import (
     KINDS,
     adaptive,
@@ -93,6 +94,13 @@ def test_a_trial_that_breaks_off_after_its_answer_is_felt_again_at_the_same_leve
     before, again = _levels(replace(whole, records=whole.records[:rated])), _levels(whole)
     assert again[len(before)] == before[-1]
     assert check_levels(SETUPS["up-down"], whole) > 10
+
+
+@pytest.mark.slow
+def test_a_run_that_is_killed_and_resumed_feels_what_the_unbroken_one_felt(tmp_path: Path) -> None:
+    kills, rows = killed_until_done(tmp_path / "killed", random.Random(1), 3)
+    assert kills == 3
+    assert rows == unbroken(tmp_path / "unbroken")
 
 
 def test_a_run_without_corrections_asks_no_more_trials_than_its_tracks_need(tmp_path: Path) -> None:
