@@ -14,7 +14,7 @@ from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
-from experiments.design.procedures.choosing import Choice, Track, tracks_of_cell
+from experiments.design.procedures.choosing import AdaptiveTrack, ChosenLevels, tracks_of_cell
 from experiments.design.stimuli import stimuli_of
 from experiments.live_run import LiveRun
 from experiments.record import storage
@@ -183,12 +183,12 @@ def _presents_again(step: Step | None, word: Outcome | Remark, trial: Trial) -> 
     return isinstance(word, Failed | Interrupted) and _about(step, word) == trial
 
 
-def expected(setup: Setup[DesignConfig], plan: Plan, history: History, number: int) -> Choice | None:
+def expected(setup: Setup[DesignConfig], plan: Plan, history: History, number: int) -> ChosenLevels | None:
     """The levels that come next in a track: of one that begins anew, and is given its answers at once."""
     table = setup.config.adaptive
     assert table is not None
     levels = tuple(float(one) for one in setup.config.factors["voltage_V"].all_levels)
-    track: Track = tracks_of_cell(table, [levels], 0.5)[number - 1]
+    track: AdaptiveTrack = tracks_of_cell(table, [levels], 0.5)[number - 1]
     for level, right in counted(history, plan, number):
         track = track.after((level,), success=right)
     return None if track.over else track.choice()

@@ -14,7 +14,19 @@ from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 from tests.refusals import Broken, check_refused, edit, line, refusal
 
 OF_THE_PAPER = ("direction", "preference")
-DESIGNS = ("voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry", *OF_THE_PAPER)
+DESIGNS = (
+    "voltages",
+    "detection",
+    "stronger",
+    "magnitude",
+    "realism",
+    "pairs",
+    "grip",
+    "hurry",
+    "threshold",
+    "staircase",
+    *OF_THE_PAPER,
+)
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"
 ANSWERING, RATING = "synthetic/direction.toml", "synthetic/preference.toml"
 """Who answers the two."""

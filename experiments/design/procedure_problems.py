@@ -21,7 +21,7 @@ from experiments.design.procedures.config import (
     starts_of,
 )
 from experiments.design.procedures.up_down import UpDown
-from experiments.design.procedures.walks import Levels, are_even, level_range, walk_rule
+from experiments.design.procedures.walks import NumericLevels, are_even, level_range, walk_rule
 
 _LARGEST_GRID = 6_000_000
 """Stimuli times places of the parameters' grid: so much is gone through in 20 ms (measured)."""
@@ -129,7 +129,7 @@ def _question_problems(table: AdaptiveConfig, questions: Mapping[str, QuestionCo
         yield f"procedure.question = {table.question!r} is no question; they are {', '.join(questions)}"
 
 
-def _start_problems(table: AdaptiveConfig, levels: Levels) -> Iterator[str]:
+def _start_problems(table: AdaptiveConfig, levels: NumericLevels) -> Iterator[str]:
     for start in starts_of(table):
         if start is not None and start not in levels:
             near = sorted(levels, key=lambda level: abs(level - start))[:2]
@@ -140,7 +140,7 @@ def _start_problems(table: AdaptiveConfig, levels: Levels) -> Iterator[str]:
             )
 
 
-def _walk_problems(table: UpDownConfig | KestenConfig, levels: Levels, guess: float) -> Iterator[str]:
+def _walk_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels, guess: float) -> Iterator[str]:
     name = table.of[0]
     if not are_even(levels):
         yield f"factors.{name}.levels: steps up and down need them at even distances; give minimum, maximum and grain"
@@ -159,7 +159,7 @@ def _walk_problems(table: UpDownConfig | KestenConfig, levels: Levels, guess: fl
         yield from _step_problems(table, levels)
 
 
-def _step_problems(table: UpDownConfig, levels: Levels) -> Iterator[str]:
+def _step_problems(table: UpDownConfig, levels: NumericLevels) -> Iterator[str]:
     """A step that is lost in the grain would hold a track where it is for ever."""
     within = level_range(levels, table.step_as)
     for size in table.steps:
@@ -174,7 +174,7 @@ def _step_problems(table: UpDownConfig, levels: Levels) -> Iterator[str]:
                 return
 
 
-def _posterior_problems(table: PosteriorConfig, levels: Sequence[Levels], guess: float) -> Iterator[str]:
+def _posterior_problems(table: PosteriorConfig, levels: Sequence[NumericLevels], guess: float) -> Iterator[str]:
     first, name = levels[0], table.of[0]
     if table.scale == "log" and min(one[0] for one in levels) <= 0:
         yield f"procedure.scale = 'log': levels must be above 0; {name} begins at {first[0]:g}"

@@ -9,7 +9,7 @@ from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import INSTRUCTION_FACTOR, TRAIN_INTERVAL, QuestionConfig
 from experiments.design.plan import Plan, Trial
-from experiments.design.procedures.choosing import Choice
+from experiments.design.procedures.choosing import ChosenLevels
 from experiments.design.stimuli import settings
 from experiments.session.history import History, of_one_set
 from experiments.session.steps import (
@@ -133,7 +133,7 @@ class _Script:
 
         Levels that are chosen are so just before they are felt first; if the track is over by then, nothing is felt.
         """
-        chosen: Choice | None = None
+        chosen: ChosenLevels | None = None
         for step in self._stimuli[trial]:
             if self._tracks is None or not trial.track or isinstance(step, Prepare):
                 yield replace(step, attempt=attempt)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.procedure_problems import guess_of, success_of
-from experiments.design.procedures.choosing import Choice, Track, tracks_of_cell
+from experiments.design.procedures.choosing import AdaptiveTrack, ChosenLevels, tracks_of_cell
 from experiments.design.procedures.config import AdaptiveConfig
 from experiments.session import steps
 from experiments.session.history import History
@@ -46,7 +46,7 @@ class Tracks:
         """Whether a track has ended, by the answers so far."""
         return self._track(number).over
 
-    def choice(self, number: int) -> Choice | None:
+    def choice(self, number: int) -> ChosenLevels | None:
         """The levels of the next trial of a track; `None` if it is over."""
         track = self._track(number)
         return None if track.over else track.choice()
@@ -61,11 +61,11 @@ class Tracks:
         self._catch_up()
         return trial.with_chosen(self._felt.get(trial, ()))
 
-    def condition(self, choice: Choice) -> Condition:
+    def condition(self, choice: ChosenLevels) -> Condition:
         """Chosen levels by their factors."""
         return tuple(zip(self._table.of, choice.levels, strict=True))
 
-    def _track(self, number: int) -> Track:
+    def _track(self, number: int) -> AdaptiveTrack:
         self._catch_up()
         return self._now[number]
 
@@ -112,14 +112,14 @@ class Tracks:
             track = self._after(track, trial, answer)
         self._now[number] = track
 
-    def _after(self, track: Track, trial: Trial, answer: CountedAnswer) -> Track:
+    def _after(self, track: AdaptiveTrack, trial: Trial, answer: CountedAnswer) -> AdaptiveTrack:
         question = self._design.questions[self._question]
         success = is_success(self._design, question, trial.with_chosen(answer.felt), answer.value)
         felt = tuple(float(level) for _, level in answer.felt)
         return track.after(felt, success=success)
 
 
-def _begun(design: DesignConfig, table: AdaptiveConfig, plan: Plan) -> dict[int, Track]:
+def _begun(design: DesignConfig, table: AdaptiveConfig, plan: Plan) -> dict[int, AdaptiveTrack]:
     """Each track before its first answer: those of a cell in the order of their starts."""
     question = design.questions[success_of(design.questions, table.question) or ""]
     levels = [tuple(float(level) for level in design.factors[name].all_levels) for name in table.of]

@@ -29,30 +29,30 @@ from experiments.design.procedures.posterior import (
 )
 from experiments.design.procedures.psychometric import Shares, share_felt
 from experiments.design.procedures.up_down import Kesten, TrackState, UpDown, track_after
-from experiments.design.procedures.walks import Levels, walk_rule
+from experiments.design.procedures.walks import NumericLevels, walk_rule
 
 _TAILS = (0.025, 0.975)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class ChosenLevels:
     """The levels of a track's next trial. `at_edge`: at the end of what there is, where the rule may want to go on."""
 
-    levels: Levels
+    levels: NumericLevels
     at_edge: bool = False
 
 
-class Track(Protocol):
+class AdaptiveTrack(Protocol):
     """Where a track stands after its answers so far."""
 
     @property
     def over(self) -> bool:
         """Whether its rule has ended it."""
 
-    def choice(self) -> Choice:
+    def choice(self) -> ChosenLevels:
         """The levels of its next trial."""
 
-    def after(self, felt: Levels, *, success: bool) -> Self:
+    def after(self, felt: NumericLevels, *, success: bool) -> Self:
         """Where it stands after one more answer, to what was felt."""
 
 
@@ -73,14 +73,14 @@ class WalkedTrack:
         """Whether its trials or reversals are done."""
         return self.state.next_level is None
 
-    def choice(self) -> Choice:
+    def choice(self) -> ChosenLevels:
         """The level that the answers call for; `ValueError`: it is over."""
         state = self.state
         if state.next_level is None:
             raise ValueError("the track is over")
-        return Choice(levels=(state.next_level,), at_edge=state.at_edge)
+        return ChosenLevels(levels=(state.next_level,), at_edge=state.at_edge)
 
-    def after(self, felt: Levels, *, success: bool) -> Self:  # noqa: ARG002 - a walk follows its answers
+    def after(self, felt: NumericLevels, *, success: bool) -> Self:  # noqa: ARG002 - a walk follows its answers
         """One answer more."""
         return replace(self, answers=(*self.answers, success))
 
@@ -92,8 +92,8 @@ class PosteriorRule:
     table: PosteriorConfig
     grid: ParameterGrid
     rule: VarianceRule | EntropyRule
-    stimuli: tuple[Levels, ...]
-    places: Mapping[Levels, int]
+    stimuli: tuple[NumericLevels, ...]
+    places: Mapping[NumericLevels, int]
     edges: frozenset[int]
     thresholds: Shares
 
@@ -122,21 +122,21 @@ class KnownTrack:
             return False
         return self.rule.credible_width(self.posterior) < table.credible_width
 
-    def choice(self) -> Choice:
+    def choice(self) -> ChosenLevels:
         """The stimulus whose answer tells most; the start, where the table names one, before the first answer."""
         rule, start = self.rule, self.rule.table.start
         if start is not None and not self.count:
-            return Choice(levels=(start,))
+            return ChosenLevels(levels=(start,))
         place = int(best_stimulus(rule.rule.gains(self.posterior)))
-        return Choice(levels=rule.stimuli[place], at_edge=place in rule.edges)
+        return ChosenLevels(levels=rule.stimuli[place], at_edge=place in rule.edges)
 
-    def after(self, felt: Levels, *, success: bool) -> Self:
+    def after(self, felt: NumericLevels, *, success: bool) -> Self:
         """One answer more, to what was felt."""
         known = posterior_after(self.rule.grid, self.posterior, self.rule.places[felt], success)
         return replace(self, posterior=known, count=self.count + 1)
 
 
-def tracks_of_cell(table: AdaptiveConfig, levels: Sequence[Levels], guess: float) -> tuple[Track, ...]:
+def tracks_of_cell(table: AdaptiveConfig, levels: Sequence[NumericLevels], guess: float) -> tuple[AdaptiveTrack, ...]:
     """The tracks of a cell before their first answer.
 
     `levels` are those of each adapted factor, and `guess` how often who feels nothing is right.
@@ -147,7 +147,7 @@ def tracks_of_cell(table: AdaptiveConfig, levels: Sequence[Levels], guess: float
     return tuple(WalkedTrack(walk_rule(table, levels[0], start)) for start in table.starts)
 
 
-def posterior_rule(table: PosteriorConfig, levels: Sequence[Levels], guess: float) -> PosteriorRule:
+def posterior_rule(table: PosteriorConfig, levels: Sequence[NumericLevels], guess: float) -> PosteriorRule:
     """The grid of a table, and the rule on it."""
     stimuli = tuple(product(*levels))
     grid = _grid(table, stimuli, guess)
@@ -166,7 +166,7 @@ def posterior_rule(table: PosteriorConfig, levels: Sequence[Levels], guess: floa
     )
 
 
-def _grid(table: PosteriorConfig, stimuli: Sequence[Levels], guess: float) -> ParameterGrid:
+def _grid(table: PosteriorConfig, stimuli: Sequence[NumericLevels], guess: float) -> ParameterGrid:
     """The parameters' values with their prior, and F of every stimulus at each.
 
     With two factors the places of `widths` are those of width × trade, as x = x1 + trade (x2 - mean of x2) is felt.

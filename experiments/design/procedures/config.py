@@ -17,7 +17,7 @@ from experiments.design.procedures.psychometric import Shape, Shares
 
 MAX_TRACK = 1_000
 """More trials than this are in no track."""
-Positive = Annotated[float, Field(gt=0, le=1e6)]
+PositiveNumber = Annotated[float, Field(gt=0, le=1e6)]
 InARow = Annotated[int, Field(ge=1, le=20)]
 StartLevels = Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
 StepAs = Literal["difference", "factor"]
@@ -54,9 +54,9 @@ class UpDownConfig(TracksConfig):
     starts: StartLevels
     up: InARow = 1
     down: InARow = 1
-    steps: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=100)]
+    steps: Annotated[tuple[PositiveNumber, ...], Field(min_length=1, max_length=100)]
     step_as: StepAs = "difference"
-    ratio: Positive = 1.0
+    ratio: PositiveNumber = 1.0
     reversals: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
 
     @model_validator(mode="after")
@@ -81,7 +81,7 @@ class KestenConfig(TracksConfig):
 
     kind: Literal["kesten"]
     starts: StartLevels
-    first_step: Positive
+    first_step: PositiveNumber
     step_as: StepAs = "difference"
     target: InnerShare
     reversals: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
@@ -109,7 +109,7 @@ class PriorConfig(Model):
     points: Annotated[int, Field(ge=1, le=200)]
     spacing: Literal["even", "log"] = "even"
     mean: float | None = None
-    sd: Positive | None = None
+    sd: PositiveNumber | None = None
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -162,7 +162,7 @@ class PosteriorConfig(TracksConfig):
     trade: PriorConfig | None = None
     start: float | None = None
     tracks: Annotated[int, Field(ge=1, le=20)] = 1
-    credible_width: Positive | None = None
+    credible_width: PositiveNumber | None = None
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

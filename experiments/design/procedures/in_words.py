@@ -11,7 +11,7 @@ from experiments.design.procedures.config import (
     PriorConfig,
     UpDownConfig,
 )
-from experiments.design.procedures.walks import Levels, walk_rule
+from experiments.design.procedures.walks import NumericLevels, walk_rule
 
 _SHAPES = {
     "normal": "a cumulative normal",
@@ -22,7 +22,7 @@ _SHAPES = {
 _TARGETS = {"threshold": "its threshold", "width": "its width", "both": "its threshold and width"}
 
 
-def rule_words(table: AdaptiveConfig, levels: Sequence[Levels]) -> str:
+def rule_words(table: AdaptiveConfig, levels: Sequence[NumericLevels]) -> str:
     """How the next level follows from the answers: a sentence's end, after “it was chosen after each answer”."""
     match table:
         case UpDownConfig():
@@ -36,7 +36,7 @@ def rule_words(table: AdaptiveConfig, levels: Sequence[Levels]) -> str:
             return _posterior(table)
 
 
-def _up_down(table: UpDownConfig, levels: Levels) -> str:
+def _up_down(table: UpDownConfig, levels: NumericLevels) -> str:
     rule = walk_rule(table, levels, levels[0])
     target = getattr(rule, "target", 0.0)
     weighed = "" if table.ratio == 1 else f", steps up {table.ratio:g} times as large"

@@ -7,12 +7,12 @@ import numpy as np
 from experiments.design.procedures.config import KestenConfig, StepAs, UpDownConfig
 from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown
 
-Levels = tuple[float, ...]
+NumericLevels = tuple[float, ...]
 _OFF = 1e-9
 """So much the distance of two levels may be off, as a share."""
 
 
-def walk_rule(table: UpDownConfig | KestenConfig, levels: Levels, start: float) -> UpDown | Kesten:
+def walk_rule(table: UpDownConfig | KestenConfig, levels: NumericLevels, start: float) -> UpDown | Kesten:
     """The rule of a track that begins at a level."""
     within = level_range(levels, table.step_as)
     stop = TrackEnd(trials=table.trials, reversals=table.reversals, least=table.least_trials)
@@ -23,13 +23,13 @@ def walk_rule(table: UpDownConfig | KestenConfig, levels: Levels, start: float) 
     )
 
 
-def level_range(levels: Levels, step_as: StepAs) -> LevelRange:
+def level_range(levels: NumericLevels, step_as: StepAs) -> LevelRange:
     """Where a walk may go: levels at even distances, lowest first."""
     grain = (levels[-1] - levels[0]) / (len(levels) - 1)
     return LevelRange(low=levels[0], high=levels[-1], grain=grain, factors=step_as == "factor")
 
 
-def are_even(levels: Levels) -> bool:
+def are_even(levels: NumericLevels) -> bool:
     """Whether levels stand at even distances, lowest first.
 
     >>> are_even((1.0, 1.5, 2.0)), are_even((1.0, 2.0, 4.0))

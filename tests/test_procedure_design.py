@@ -1,0 +1,131 @@
+"""The table `[procedure]` at the door: what is refused, by name; what is planned, said and shown of what is taken."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+
+from analysis.predict.check_design import check_design
+from experiments.config.door import ConfigError, checked_table
+from experiments.design.config import DesignConfig
+from experiments.design.planning import plan_of, practice_of
+from experiments.load import load_setup
+from experiments.screens import texts
+from experiments.session.design_session import design_session
+from experiments.session.history import GrowingHistory
+from experiments.session.steps import Ask, FireShot, step_after
+from tests.designs import changed, merged
+from tests.driven_designs import done
+
+THRESHOLD, STAIRCASE = load_setup("threshold"), load_setup("staircase")
+ONE, OTHER = THRESHOLD.config.model_dump(mode="json"), STAIRCASE.config.model_dump(mode="json")
+TWO = {"of": ["voltage_V", "pulse_s"], "rule": "entropy"}
+
+
+def said(tables: dict[str, Any], changes: dict[str, Any]) -> str:
+    with pytest.raises(ConfigError) as refused:
+        checked_table(DesignConfig, _bare(merged(tables, changes)), "f.toml")
+    return str(refused.value)
+
+
+def _bare(tables: dict[str, Any]) -> dict[str, Any]:
+    """Tables without the keys that are taken out by `None`, as a file has none."""
+    return {key: _bare(one) if isinstance(one, dict) else one for key, one in tables.items() if one is not None}
+
+
+REFUSED = [
+    (ONE, {"procedure": {"of": ["direction"]}}, "procedure.of: the levels of direction are words"),
+    (ONE, {"procedure": {"of": ["friction_N"]}}, "procedure names 'friction_N', which is no factor"),
+    (ONE, {"factors": {"posture": {"levels": [1.0, 2.0]}}, "procedure": {"of": ["posture"]}}, "posture is set by hand"),
+    (OTHER, {"procedure": {"steps": [0.0]}}, "procedure.steps.0 = 0.0: must be above 0"),
+    (OTHER, {"procedure": {"steps": [1e-5]}}, "1e-05 does not leave the level 0.001 of pulse_s (grain 0.00025)"),
+    (OTHER, {"procedure": {"starts": [0.0011]}}, "the start 0.0011 is none of the levels of pulse_s, 0.001 to 0.01"),
+    (OTHER, {"procedure": {"down": 1}}, "the rule settles where 0.5 are right, and who feels nothing is right in 0.5"),
+    (OTHER, {"procedure": {"reversals": 40}}, "reversals = 40 takes 81 trials or more, and trials = 50 end a track"),
+    (OTHER, {"procedure": {"trials": None}}, "procedure.trials: is missing"),
+    (OTHER, {"procedure": {"least_trials": 60}}, "least_trials = 60 is more than trials = 50"),
+    (OTHER, {"factors": {"pulse_s": {"levels": [0.002, 0.006, 0.008]}}}, "need them at even distances"),
+    (ONE, {"procedure": {"start": 3.0}}, "start = 3 is excluded by the prior of the threshold, 4 to 20"),
+    (ONE, {"procedure": {"threshold": {"mean": 30.0, "sd": 2.0}}}, "mean 30 is outside of 4 to 20"),
+    (ONE, {"procedure": {"threshold": {"minimum": 21.0, "maximum": 25.0}}}, "21 to 25, holds none of the levels"),
+    (ONE, {"procedure": {"width": {"minimum": 0.0}}}, "minimum 0 must be above 0"),
+    (ONE, {"procedure": {"lapse": {"minimum": 0.0, "maximum": 0.6, "points": 3}}}, "leave nothing to feel"),
+    (ONE, {"procedure": {"guess": {"minimum": 0.0, "maximum": 0.1, "points": 2}}}, "who feels nothing is right in 0.5"),
+    (ONE, {"questions": {"response": {"correct": None}}}, "no answer is a success (response)"),
+    (ONE, {"procedure": {"question": "other"}}, "procedure.question = 'other' is no question"),
+    (ONE, {"procedure": {"mixed": ["voltage_V"]}}, "procedure.mixed: voltage_V is what is chosen"),
+    (ONE, {"procedure": {"kind": "psi"}}, "kind = 'psi' is none of constant, up-down, kesten, posterior"),
+    (ONE, {"order": {"repetitions": 2}}, "order.repetitions is of constant stimuli"),
+    (ONE, {"order": {"session": ["voltage_V"]}}, "voltage_V must vary from trial to trial"),
+    (ONE, {"procedure": {"of": ["voltage_V", "method"]}}, "two factors take the rule entropy"),
+    (ONE, {"procedure": {**TWO}}, "trade is missing"),
+    (ONE, {"factors": {"voltage_V": {"levels": {"minimum": 4.0, "maximum": 4.4, "grain": 0.3}}}}, "does not divide"),
+]
+
+
+@pytest.mark.parametrize(("tables", "changes", "words"), REFUSED, ids=[words[:40] for _, _, words in REFUSED])
+def test_what_cannot_be_is_refused_by_name(tables: dict[str, Any], changes: dict[str, Any], words: str) -> None:
+    assert words in said(tables, changes)
+
+
+def test_a_grid_beyond_the_gun_is_refused_with_its_limit() -> None:
+    from experiments.load import check_limits
+
+    levels = {"minimum": 20.0, "maximum": 25.0, "grain": 1.0}
+    wide = {"threshold": {"minimum": 18.0, "maximum": 26.0, "points": 9}}
+    setup = changed("threshold", factors={"voltage_V": {"levels": levels}}, procedure=wide)
+    with pytest.raises(ConfigError, match=r"factors\.voltage_V\.levels: .*voltage_V = 25.*24"):
+        check_limits(setup)
+
+
+def test_a_plan_has_a_track_for_each_cell_and_start_and_no_level_of_what_is_chosen() -> None:
+    plan = plan_of(THRESHOLD.config, "P01", 1)
+    assert Counter(trial.track for trial in plan.trials) == {1: 40, 2: 40}
+    assert {trial.level("voltage_V") for trial in plan.trials} == {None}
+    each = Counter((trial.track, trial.direction) for trial in plan.trials)
+    assert set(each.values()) == {20}
+    rounds = [{one.track for one in plan.trials[at : at + 2]} for at in range(0, 80, 2)]
+    assert rounds == [{1, 2}] * 40
+
+
+def test_tracks_come_one_after_another_where_the_design_says_so() -> None:
+    plan = plan_of(changed("staircase", procedure={"interleave": False}).config, "P01", 1)
+    tracks = [trial.track for trial in plan.trials]
+    assert tracks == sorted(tracks)
+
+
+def test_catch_trials_and_practice_are_of_no_track() -> None:
+    yes = {"kind": "yes-no", "text": "Felt?", "correct": "stimulus"}
+    changes = {"trial": {"catch": 8}, "questions": {"felt": yes, "response": None}, "factors": {"direction": None}}
+    changes |= {"procedure": {"mixed": []}, "practice": {"repetitions": 2, "of": ["method"]}}
+    design = checked_table(DesignConfig, _bare(merged(ONE, changes)), "f.toml")
+    plan, practice = plan_of(design, "P01", 1), practice_of(design, "P01", 1)
+    assert Counter((trial.catch, trial.track > 0) for trial in plan.trials) == {(True, False): 8, (False, True): 80}
+    assert practice is not None
+    assert all(isinstance(trial.level("voltage_V"), float) and not trial.track for trial in practice.trials)
+
+
+def test_check_says_how_long_it_takes_at_the_least_and_at_the_most() -> None:
+    found = check_design(STAIRCASE, 1, ["P01"])
+    assert (found.least_trials, found.trials) == (42, 100)  # 10 reversals are 11 moves: 6 of one trial, 5 of three
+    assert found.least_duration_s == pytest.approx(42 * 10.0)
+    assert "42 trials and 7 min at the least, 100 trials and 17.17 min at the most" in " ".join(found.text)
+    assert "3 down, 1 up, towards 79.4 %" in found.text[0]
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_the_experimenter_sees_a_level_only_where_the_design_allows_it(shown: bool) -> None:
+    setup = changed("threshold", procedure={"show_level": shown})
+    plan, told = plan_of(setup.config, "P01", 1), GrowingHistory()
+    session = design_session(plan, setup, told)
+    step = next(session)
+    while not isinstance(step, Ask):
+        told.append((step, done(step, 0)))
+        step = step_after(session, told[-1][1])
+    fired = next(one for one, _ in told if isinstance(one, FireShot))
+    level = dict(fired.chosen)["voltage_V"]
+    assert texts.chosen_text(told, step.trial) == (f"voltage_V = {level:g}" if shown else "")
+    assert texts.track_text(plan, told, step.trial) == f"Track {step.trial.track}: 0 of at most 40 trials"
+    assert texts.place_text(plan, step.trial).startswith("Trial 1 of at most 80")
