@@ -60,7 +60,7 @@ REFUSED = [
     (ONE, {"order": {"repetitions": 2}}, "order.repetitions is of constant stimuli"),
     (ONE, {"order": {"session": ["voltage_V"]}}, "voltage_V must vary from trial to trial"),
     (ONE, {"procedure": {"of": ["voltage_V", "method"]}}, "two factors take the rule entropy"),
-    (ONE, {"procedure": {**TWO}}, "trade is missing"),
+    (ONE, {"procedure": {**TWO}}, "rise is missing"),
     (ONE, {"factors": {"voltage_V": {"levels": {"minimum": 4.0, "maximum": 4.4, "grain": 0.3}}}}, "does not divide"),
 ]
 

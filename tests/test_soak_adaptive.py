@@ -92,7 +92,7 @@ def test_times(soak: Soak) -> None:
     one = _times_ms(_one_dimension(), 4)
     figure, how = (
         _shown(one),
-        "grid 60 × 20 × 5, 57 levels, 4 runs of 2 tracks of 60 trials; answer to next shot, in process",
+        "grid 60 × 20 × 5, 65 levels, 4 runs of 2 tracks of 60 trials; answer to next shot, in process",
     )
     soak("from answer to next stimulus, one dimension", figure, f"99 % under {ONE_DIMENSION_MS:g} ms", how)
     assert np.quantile(one, 0.99) < ONE_DIMENSION_MS
@@ -120,7 +120,7 @@ def _two_dimensions() -> Setup[DesignConfig]:
     axes = {
         "threshold": {"minimum": 4.0, "maximum": 18.5, "points": 20},
         "width": {"minimum": 0.2, "maximum": 2.0, "points": 10},
-        "trade": {"minimum": 0.0, "maximum": 1.5, "points": 6},
+        "rise": {"minimum": -1.5, "maximum": 0.0, "points": 6},
         "lapse": {"minimum": 0.0, "maximum": 0.08, "points": 5},
     }
     both = {"of": ("voltage_V", "pulse_s"), "rule": "entropy", "scale": "log", "tracks": 1, "trials": 100}

@@ -187,7 +187,7 @@ def _posterior_problems(table: PosteriorConfig, levels: Sequence[NumericLevels],
         yield f"procedure.guess: who feels nothing is right in {guess:.3g} here, by the design; remove the table"
     if guess + table.lapse.maximum >= 1:
         yield f"procedure.lapse.maximum = {table.lapse.maximum:g} and the guess rate {guess:.3g} leave nothing to feel"
-    places, parts = 1, (table.threshold, table.width, table.lapse, table.guess, table.trade)
+    places, parts = 1, (table.threshold, table.width, table.lapse, table.guess, table.rise, table.floor)
     for points in (*(part.points for part in parts if part), *map(len, levels)):
         places *= points
     if places > _LARGEST_GRID:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import product
 from typing import Protocol, Self
 
@@ -24,13 +25,20 @@ from experiments.design.procedures.posterior import (
     WantedParameter,
     best_stimulus,
     entropy_rule,
+    parameter_grid,
     posterior_after,
     variance_rule,
 )
-from experiments.design.procedures.psychometric import Shares, share_felt
+from experiments.design.procedures.psychometric import Shares
+from experiments.design.procedures.surface import SurfaceGrid, surface_grid
 from experiments.design.procedures.up_down import Kesten, TrackState, UpDown, track_after
 from experiments.design.procedures.walks import NumericLevels, walk_rule
 
+_WANTED: Mapping[str, tuple[WantedParameter, ...]] = {
+    "threshold": ("threshold",),
+    "width": ("width",),
+    "both": ("threshold", "width"),
+}
 _TAILS = (0.025, 0.975)
 
 
@@ -90,18 +98,16 @@ class PosteriorRule:
     """A table's grid of parameters, its stimuli as levels of each factor, and when a track of it is over."""
 
     table: PosteriorConfig
-    grid: ParameterGrid
+    grid: ParameterGrid | SurfaceGrid
     rule: VarianceRule | EntropyRule
     stimuli: tuple[NumericLevels, ...]
     places: Mapping[NumericLevels, int]
     edges: frozenset[int]
-    thresholds: Shares
 
     def credible_width(self, posterior: Shares) -> float:
         """How wide the 95 % credible interval of the threshold is, in the factor's unit."""
-        weights = posterior.sum(axis=-1).reshape(len(self.thresholds), -1).sum(axis=-1)
-        low, high = np.interp(_TAILS, np.cumsum(weights) - weights / 2, self.thresholds)
-        return float(high - low)
+        low, high = self.grid.quantiles(posterior, next(iter(self.grid.axes)), _TAILS)
+        return float(np.exp(high) - np.exp(low) if self.table.scale == "log" else high - low)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,43 +157,54 @@ def posterior_rule(table: PosteriorConfig, levels: Sequence[NumericLevels], gues
     """The grid of a table, and the rule on it."""
     stimuli = tuple(product(*levels))
     grid = _grid(table, stimuli, guess)
-    wanted: Mapping[str, tuple[WantedParameter, ...]] = {"both": ("threshold", "width"), "width": ("width",)}
-    asked = wanted.get(table.target, ("threshold",))
+    if isinstance(grid, ParameterGrid) and table.rule == "variance":
+        rule: VarianceRule | EntropyRule = variance_rule(grid, _WANTED[table.target])
+    else:
+        rule = entropy_rule(grid)
     ends = [{one[0], one[-1]} for one in levels]
     edges = (at for at, one in enumerate(stimuli) if any(x in end for x, end in zip(one, ends, strict=True)))
     return PosteriorRule(
         table=table,
         grid=grid,
-        rule=entropy_rule(grid) if table.rule == "entropy" else variance_rule(grid, asked),
+        rule=rule,
         stimuli=stimuli,
         places={one: place for place, one in enumerate(stimuli)},
         edges=frozenset(edges),
-        thresholds=table.threshold.values,
     )
 
 
-def _grid(table: PosteriorConfig, stimuli: Sequence[NumericLevels], guess: float) -> ParameterGrid:
+def _grid(table: PosteriorConfig, stimuli: Sequence[NumericLevels], guess: float) -> ParameterGrid | SurfaceGrid:
     """The parameters' values with their prior, and F of every stimulus at each.
 
-    With two factors the places of `widths` are those of width × trade, as x = x1 + trade (x2 - mean of x2) is felt.
+    Of two factors the threshold of the first is `threshold` at the mean of the second's levels, and changes along it.
     """
     x = np.array(stimuli) if table.scale == "linear" else np.log(stimuli)
-    thresholds = table.threshold.values if table.scale == "linear" else np.log(table.threshold.values)
-    trade = table.trade or PriorConfig(minimum=0.0, maximum=0.0, points=1)
     guesses = table.guess or PriorConfig(minimum=guess, maximum=guess, points=1)
-    t, w, k = (axis.ravel() for axis in np.meshgrid(thresholds, table.width.values, trade.values, indexing="ij"))
-    second = x[:, 1] - x[:, 1].mean() if x.shape[1] > 1 else np.zeros(len(x))
-    parts = (table.threshold, table.width, trade, table.lapse, guesses)
-    prior = np.einsum("i,j,k,l,m->ijklm", *(one.weights for one in parts))
-    lapse, chance = (axis.ravel() for axis in np.meshgrid(table.lapse.values, guesses.values, indexing="ij"))
-    return ParameterGrid(
-        stimuli=x[:, 0],
-        thresholds=thresholds,
-        widths=np.repeat(table.width.values, trade.points),
-        lapses=table.lapse.values,
-        guesses=guesses.values,
-        prior=prior.reshape(len(thresholds), -1, table.lapse.points, guesses.points) / prior.sum(),
-        felt=share_felt(x[:, :1] + k * second[:, None], t, w, table.shape),
-        chance=chance,
-        slack=1 - chance - lapse,
+    rates = {"lapses": table.lapse.values, "guesses": guesses.values}
+    after = (table.width.weights, table.lapse.weights, guesses.weights)
+    if table.rise is None:
+        prior = _outer(table.threshold.weights, *after)
+        thresholds, widths = _scaled(table, table.threshold), table.width.values
+        return parameter_grid(
+            stimuli=x[:, 0], thresholds=thresholds, widths=widths, prior=prior, shape=table.shape, **rates
+        )
+    floor_weights = np.ones(1) if table.floor is None else table.floor.weights
+    return surface_grid(
+        stimuli=np.column_stack([x[:, 0], x[:, 1] - x[:, 1].mean()]),
+        intercepts=_scaled(table, table.threshold),
+        rises=table.rise.values,
+        floors=np.array([-np.inf]) if table.floor is None else _scaled(table, table.floor),
+        widths=table.width.values,
+        prior=_outer(table.threshold.weights, table.rise.weights, floor_weights, *after),
+        shape=table.shape,
+        **rates,
     )
+
+
+def _scaled(table: PosteriorConfig, prior: PriorConfig) -> Shares:
+    """The values of a level, as the function takes them."""
+    return prior.values if table.scale == "linear" else np.asarray(np.log(prior.values))
+
+
+def _outer(*weights: Shares) -> Shares:
+    return np.asarray(reduce(np.multiply.outer, weights))

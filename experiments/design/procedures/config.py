@@ -159,7 +159,8 @@ class PosteriorConfig(TracksConfig):
     width: PriorConfig
     lapse: PriorConfig = PriorConfig(minimum=0.0, maximum=0.08, points=5)
     guess: PriorConfig | None = None
-    trade: PriorConfig | None = None
+    rise: PriorConfig | None = None
+    floor: PriorConfig | None = None
     start: float | None = None
     tracks: Annotated[int, Field(ge=1, le=20)] = 1
     credible_width: PositiveNumber | None = None
@@ -205,10 +206,12 @@ def _two_factor_problems(table: PosteriorConfig) -> Iterator[str]:
     two = len(table.of) == 2
     if two and table.rule != "entropy":
         yield f"of = {', '.join(table.of)}: two factors take the rule entropy, not {table.rule}"
-    if two and table.trade is None:
-        yield "trade is missing: two factors need to know how much of the first one of the second is worth"
-    if not two and table.trade is not None:
-        yield "trade is of two factors; remove it"
+    if two and table.rise is None:
+        yield "rise is missing: of two factors the threshold of the first changes along the second; give its values"
+    for name in (key for key in ("rise", "floor") if not two and getattr(table, key) is not None):
+        yield f"{name} is of two factors; remove it"
+    if two and table.scale == "log" and table.floor is not None and table.floor.minimum <= 0:
+        yield f'scale = "log": floor.minimum = {table.floor.minimum:g} must be above 0'
     if two and table.start is not None:
         yield "start is of one factor; remove it"
 

@@ -57,7 +57,8 @@ def _posterior(table: PosteriorConfig) -> str:
             f"so that the expected posterior variance of a psychometric function was least in {_TARGETS[table.target]}"
         )
     parts = {"threshold": table.threshold, "width": table.width, "lapse rate": table.lapse}
-    parts |= {name: one for name, one in {"guess rate": table.guess, "trade": table.trade}.items() if one is not None}
+    further = {"guess rate": table.guess, "rise": table.rise, "floor": table.floor}
+    parts |= {name: one for name, one in further.items() if one is not None}
     return f"{how} ({shape}; {', '.join(f'{name} {_prior(one)}' for name, one in parts.items())})"
 
 
