@@ -149,7 +149,8 @@ def _scale(question: QuestionConfig) -> str | None:
 
 def varied(design: DesignConfig) -> list[str]:
     """The columns by which conditions differ: factors with several levels; of pairs both intervals."""
-    names = [name for name, factor in design.factors.items() if len(factor.all_levels) > 1]
+    own = {name: one for name, one in design.factors.items() if name not in design.adapted}
+    names = [name for name, factor in own.items() if len(factor.all_levels) > 1]
     if design.trial.kind != "pair":
         return names
     compared = design.trial.compare
