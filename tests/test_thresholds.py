@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from scipy.stats import norm
 from analysis.psychometric.people import PersonFit
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
+from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from analysis.summary.thresholds import MOST_FITTED, Thresholds, thresholds
 from experiments.design.config import DesignConfig
+from experiments.load import load_setup
 from tests.designs import design
 from tests.tables_of_designs import loaded, simulated
 
@@ -222,3 +225,28 @@ def test_the_pages_have_groups_differences_people_and_a_panel_each(
     assert sentence.startswith("Threshold in voltage in V, mean over people: Asymmetric Force I: 9.0")
     figure_functions(summary, summary.questions["response"].thresholds, tmp_path / "functions")  # type: ignore[arg-type]
     assert (tmp_path / "functions.png").is_file()
+
+
+def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -> None:
+    config = load_setup("threshold").config
+    told = [(1, 12.0, 1), (2, 12.0, 0), (1, 10.0, 0), (2, 14.0, 1), (1, 11.0, 1)]
+    rows = [
+        {"participant_id": "A", "method": "asymmetric-1", "track": track, "voltage_V": level, "direction": "forward"}
+        | {"response": "forward" if right else "backward", "correct": right}
+        for track, level, right in told * 4
+    ]
+    found = thresholds(config, "response", pd.DataFrame(rows))
+    assert found is not None
+    first, second = found.tracks
+    assert (first.track, first.levels[:3], first.successes[:3]) == (1, (12.0, 10.0, 11.0), (True, False, True))
+    assert (second.track, second.levels[:2], second.successes[:2]) == (2, (12.0, 14.0), (False, True))
+    figure_tracks(found, tmp_path / "tracks")
+    assert (tmp_path / "tracks.png").stat().st_size > 5000
+
+
+def test_levels_of_two_factors_have_no_single_function() -> None:
+    config = load_setup("threshold").config
+    both = config.adaptive.model_copy(update={"of": ("voltage_V", "pulse_s")})
+    found = thresholds(config.model_copy(update={"procedure": both}), "response", pd.DataFrame({"voltage_V": [12.0]}))
+    assert found is not None
+    assert found.reason == "the procedure chose levels of voltage_V and pulse_s together, and a function is of one"

@@ -25,8 +25,9 @@ from analysis.psychometric.people import (
     with_group,
 )
 from analysis.psychometric.priors import default_priors
-from analysis.report.serial import beside
+from analysis.report.serial import UNWRITTEN, beside
 from analysis.stats.arrays import FloatArray
+from analysis.summary.tracks import TrackAnswers, tracks_in
 from experiments.design.config import DesignConfig
 from experiments.design.language import INTERVAL_NAMES, YES, Level, QuestionConfig, shown_level
 from experiments.tasks.questions import chance, correct_columns
@@ -65,7 +66,8 @@ class Thresholds:
     """The psychometric functions of one question over `factor`; none with a `reason`.
 
     `share`: of what, right answers, yes, or the level chosen over the standard. `guess`: chance where the design knows
-    it. Of the `people` so many were `fitted`. `even`: trials whose two intervals had the same level.
+    it. Of the `people` so many were `fitted`. `even`: trials whose two intervals had the same level. `tracks`: of a
+    procedure that chose the levels from the answers.
     """
 
     factor: str
@@ -79,6 +81,7 @@ class Thresholds:
     conditions: tuple[ConditionFit, ...] = ()
     differences: tuple[ConditionDifference, ...] = ()
     reason: str | None = None
+    tracks: tuple[TrackAnswers, ...] = field(default=(), repr=False, metadata=UNWRITTEN)
 
 
 def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybody: bool = False) -> Thresholds | None:
@@ -98,12 +101,16 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     answers = _Answers(design, name, factor, share, table)
     if not len(answers.rows):
         return replace(found, reason="nobody answered")
-    return _fitted(answers, replace(found, even=answers.even), everybody=everybody)
+    tracks = tuple(tracks_in(design, answers.conditions, answers.rows))
+    return _fitted(answers, replace(found, even=answers.even, tracks=tracks), everybody=everybody)
 
 
 def numeric_factor(design: DesignConfig) -> str | None:
-    """The factor that a function is of: the compared one, else the first within people with three numbers or more."""
-    compared = design.trial.compare
+    """The factor that a function is of: the one that a procedure chooses or that is compared, else the first in people.
+
+    It has three numbers or more.
+    """
+    compared = next(iter(design.adapted), design.trial.compare)
     names = [compared] if compared is not None else [one for one in design.factors if one not in design.between]
     numbers = {name: _numbers(design.factors[name].all_levels) for name in names}
     return next((name for name, some in numbers.items() if len(some) > 2), None)
@@ -127,6 +134,8 @@ def fitted_share(design: DesignConfig, question: QuestionConfig) -> FittedShare 
 
 def _unordered(design: DesignConfig, factor: str, share: FittedShare) -> str:
     """Why the share of right answers has no single function of the level; empty if it has."""
+    if len(design.adapted) > 1:
+        return f"the procedure chose levels of {' and '.join(design.adapted)} together, and a function is of one"
     standard, levels = design.trial.standard, _numbers(design.factors[factor].all_levels)
     if share == "chosen" or standard is None or isinstance(standard, str):
         return ""

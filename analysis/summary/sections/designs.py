@@ -155,6 +155,10 @@ def effect_words(effect: str) -> str:
     return _WITH_UNIT.sub(lambda found: factor_words(found[0]), named(effect))
 
 
+_LISTED = 15
+"""More levels than these are counted: of a procedure that chooses among many, each says nothing."""
+
+
 def _factors(found: DesignSummary) -> str:
     varied = {name: levels for name, levels in found.factors.items() if len(levels) > 1}
     said = "; ".join(f"{factor_words(name)}: {_listed(found, name, levels)}" for name, levels in varied.items())
@@ -162,7 +166,8 @@ def _factors(found: DesignSummary) -> str:
 
 
 def _listed(found: DesignSummary, name: str, levels: Sequence[Level]) -> str:
-    return ", ".join(display_name(found.label(name, level)) for level in levels)
+    shown = [display_name(found.label(name, level)) for level in levels]
+    return ", ".join(shown) if len(shown) <= _LISTED else f"{len(shown)} levels from {shown[0]} to {shown[-1]}"
 
 
 def _assumed(found: DesignSummary) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.pairs import figure_pairs, has_scores
 from analysis.summary.figures.results import figure_8, figure_directions, has_matrix
+from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
@@ -59,6 +60,8 @@ def _write_models(folder: Path, name: str, design: DesignSummary) -> None:
     for asked, question in design.questions.items():
         if question.thresholds is not None and question.thresholds.conditions:
             figure_functions(design, question.thresholds, folder / functions_figure_of(name, asked))
+            if question.thresholds.tracks:
+                figure_tracks(question.thresholds, folder / tracks_figure_of(name, asked))
         if question.pairs is not None and has_scores(question.pairs):
             figure_pairs(design, question.pairs, folder / pairs_figure_of(name, asked))
 
@@ -71,6 +74,11 @@ def figure_of(name: str) -> str:
 def functions_figure_of(name: str, question: str) -> str:
     """The stem of the figure of a question's psychometric functions."""
     return f"figure-{name}-{question}-functions"
+
+
+def tracks_figure_of(name: str, question: str) -> str:
+    """The stem of the figure of a procedure's tracks."""
+    return f"figure-{name}-{question}-tracks"
 
 
 def pairs_figure_of(name: str, question: str) -> str:

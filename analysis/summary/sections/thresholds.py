@@ -11,14 +11,16 @@ from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Picture, Section, Table
 from analysis.summary.figures.functions import MOST_PANELS
+from analysis.summary.figures.tracks import MOST_TRACK_PANELS
 from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
-from analysis.summary.sections.pictures import functions_figure_of
+from analysis.summary.sections.pictures import functions_figure_of, tracks_figure_of
 from analysis.summary.thresholds import ConditionFit, Thresholds
 from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
 _SHARES = {"right": "right answers", "yes": "yes", "chosen": "choices of the level over the standard"}
+_SUCCESS = {"right": "right", "yes": "yes", "chosen": "chosen over the standard"}
 _TOLD = 4
 """So many conditions are told in a sentence; more are in the table."""
 
@@ -63,7 +65,7 @@ def _section(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Sec
     return Section(
         title=title,
         paragraphs=(_what(of), *_who(of), *_without(of)),
-        pictures=(_picture(name, asked, found, of),),
+        pictures=(_picture(name, asked, found, of), *_picture_of_tracks(name, asked, found, of)),
         tables=tuple(_tables(asked, found, of)),
     )
 
@@ -126,6 +128,24 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
     said = "; ".join(threshold_words(found, of)) or "nobody's fit"
     return Picture(
         stem=functions_figure_of(name, asked), caption=caption, alt=f"Psychometric functions. {_measure(of)}: {said}."
+    )
+
+
+def _picture_of_tracks(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Iterator[Picture]:
+    """Where a procedure chose the levels: how it went."""
+    if not of.tracks:
+        return
+    people = len({track.participant for track in of.tracks})
+    more = people - MOST_TRACK_PANELS
+    rest = f" {more:,} more people have no panel." if more > 0 else ""
+    ends = "; dashed, with a band: the participant's threshold and its interval" if len(of.conditions) == 1 else ""
+    yield Picture(
+        stem=tracks_figure_of(name, asked),
+        caption=(
+            f"{found.title.rstrip('.?!')}, {asked}: the levels that the answers chose, trial by trial, a panel a "
+            f"participant and a line a track. Filled: {_SUCCESS[of.share]}; empty: not{ends}.{rest}"
+        ),
+        alt=f"Levels by trial of {len(of.tracks)} tracks of {people} participants.",
     )
 
 
