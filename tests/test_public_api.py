@@ -156,3 +156,23 @@ def test_help_loads_none_of_what_commands_use() -> None:
 def test_the_version_is_the_packages(recoil: Recoil) -> None:
     done = recoil("--version")
     assert (done.returncode, done.stdout.strip()) == (0, version("recoil"))
+
+
+@pytest.mark.slow
+def test_commands_load_nothing_heavy_that_they_do_not_use() -> None:
+    code = """
+import sys
+from pathlib import Path
+from analysis.predict import check
+from analysis.predict.simulate import run
+check.check_text(check.check("direction", 1, 3))
+assert not {"scipy.special", "matplotlib", "pandas", "pyarrow", "numba"} & set(sys.modules), "check"
+model = run.ModelRequest(fidelity=None, scene=None, needs=())
+usual = dict.fromkeys(("method", "trace", "plot", "hand", "contact_stiffness_N_m", "table"))
+alone = run.SimulateRequest(gun="gun", changes=(), model=model, audit=False, vary=(), yes=False, **usual)
+run.simulated(alone, None, None)
+assert not {"scipy.special", "matplotlib", "pandas", "pyarrow", "numba"} & set(sys.modules), "simulate"
+import analysis.summary.analyze
+assert not {"scipy.stats", "scipy.optimize", "numba", "pingouin", "analysis.paper.audit"} & set(sys.modules), "analyze"
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -209,4 +209,11 @@ def _origin(found: Bench) -> Section:
     return Section(title="Provenance", tables=(origin_table({"seed": found.seed, **found.provenance}),))
 
 
+def bench_time_s(chosen: Sequence[str], request: BenchRequest) -> float:
+    """About how long these parts take, with the compiler's code made before."""
+    shots = request.batch * (request.repeats + 1)
+    taken = {"post-hocs": 8.0, "physics": 8.0 + 2e-5 * shots}
+    return sum(taken[name] for name in chosen)
+
+
 PARTS: dict[str, Callable[[BenchRequest], Measured]] = {"post-hocs": post_hocs, "physics": physics}

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from analysis.paper.paper import load_paper
 from analysis.predict.check_design import AS_FROZEN, DesignCheck, check_design, design_sections
 from analysis.report.section import Section
 from analysis.report.serial import plain
@@ -85,6 +84,8 @@ def _meaning(name: str, seed: int | None, participants: int) -> AnyCheck:
         return GunCheck(gun=gun.title, methods=tuple(gun.methods), assumed=tuple(gun.assumed))
     if not {"direction", "preference", "paper"} & set(table):
         raise ConfigError(f"{path}: no config that is known: neither a design, a study, a gun nor a paper's numbers")
+    from analysis.paper.paper import load_paper  # noqa: PLC0415 - no design has published numbers
+
     paper = load_paper(path)
     return PaperCheck(paper=path.name, experiments={"direction": paper.direction.n, "preference": paper.preference.n})
 
@@ -106,6 +107,8 @@ def _check_paper(study: Path, paper: Path) -> None:
     """`ConfigError`: the numbers that a study is to be compared with are not there, or are none."""
     if not paper.is_file():
         raise ConfigError(at_key(study, f"paper = {paper.name!r}: no such file beside the study; leave the key out"))
+    from analysis.paper.paper import load_paper  # noqa: PLC0415 - as above
+
     load_paper(paper)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from analysis.predict.drawn import RatingStudies, studies_of
 from analysis.predict.exposure import Exposure, exposure
-from analysis.predict.synthetic_studies import percepts_of_methods
 from analysis.report.section import Section, Table
 from analysis.report.serial import OPTIONAL, written
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
@@ -142,6 +141,8 @@ def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]
         return {}
     if isinstance(studies, RatingStudies) or not isinstance(studies.law, DiffusionLaw):
         return {}
+    from analysis.predict.synthetic_studies import percepts_of_methods  # noqa: PLC0415 - of use for such laws alone
+
     mind, told = studies.law.own, studies.instructions or (NEUTRAL,)
     return {
         method: {name: rate for name, rate in rates_by_instruction(mind, percept).items() if name in told}

@@ -61,6 +61,16 @@ def say(text: str) -> None:
     sys.stderr.write(f"{text}\n")
 
 
+_LONG_S = 10.0
+
+
+def say_how_long(seconds: float) -> None:
+    """Of what takes over ten seconds on a usual machine, say beforehand about how long that is."""
+    if seconds > _LONG_S:
+        about = f"{seconds / 60:.0f} minutes" if seconds > 100 else f"{10 * round(seconds / 10)} s"
+        say(f"recoil: this takes about {about}")
+
+
 def in_text(section: Section) -> str:
     """A section's words for a terminal: its title, then what it says, set in."""
     return "\n".join([section.title, *(f"  {line}" for line in (*section.paragraphs, *section.items))])

@@ -8,7 +8,17 @@ from typing import Annotated
 
 import typer
 
-from analysis.report.terminal import AsJsonOption, FixedSeedOption, GunConfigOption, end, in_text, progress, say, show
+from analysis.report.terminal import (
+    AsJsonOption,
+    FixedSeedOption,
+    GunConfigOption,
+    end,
+    in_text,
+    progress,
+    say,
+    say_how_long,
+    show,
+)
 
 MethodOption = Annotated[str | None, typer.Option(help="Rendering method of the gun.")]
 ChangesOption = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter.")]
@@ -132,6 +142,7 @@ def bench(
     if unknown:
         raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(feature.PARTS)}")
     request = feature.BenchRequest(seed=seed, repeats=repeats, batch=batch, progress=progress)
+    say_how_long(feature.bench_time_s(parts or list(feature.PARTS), request))
     found = feature.bench(out, parts or [], request)
     lines = [line for part in found.parts.values() for line in part.lines]
     show(found.content, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)

@@ -18,6 +18,7 @@ from analysis.report.terminal import (
     end,
     progress,
     say,
+    say_how_long,
     show,
     tracked,
 )
@@ -49,6 +50,7 @@ def reproduce(
     loaded = feature.prepared(study, seed, observer.value if observer else None)
     if not loaded.reconstructed and observer is None:
         say("\n".join(f"recoil: {note}" for note in loaded.notes))
+    say_how_long(feature.reproduction_time_s(loaded))
     with progress("reproduce", len(loaded.runs) + 3) as tell:
         done = feature.reproduce(loaded, out, tell)
     show(done.statistics, f"{feature.comparison_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)

@@ -137,6 +137,7 @@ def design(
         grid=grid,
         seed=seed,
     )
+    terminal.say_how_long(feature.search_time_s(request, workers))
     found = feature.design(request, workers, out, terminal.progress)
     terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
     raise terminal.end(exceptions=found.best is None)

@@ -127,7 +127,7 @@ def _simulated(
         return layers(space, rows, simulate_rows(rows, run, tell))
 
 
-__all__ = ["DesignRequest", "design", "in_short"]
+__all__ = ["DesignRequest", "design", "in_short", "search_time_s"]
 
 COLUMNS = (
     *("friction_N", "voltage_V", "pulse_s", "status", "limit", "shooting_rate_Hz"),
@@ -150,6 +150,17 @@ def design(request: DesignRequest, workers: int | None, out: Path, progress: Pro
         _write(out, result, found.designs)
         tell("written")
     return result
+
+
+_SHOT_S = 0.0017  # of one core, with what is felt of it
+_AROUND_S = 6.0  # fit, contour and report
+
+
+def search_time_s(request: DesignRequest, workers: int | None) -> float:
+    """About how long a search takes."""
+    space = make_space(request)
+    shots = len(space.friction_N) * len(space.voltage_V) * len(space.pulses_s)
+    return _AROUND_S + _SHOT_S * shots / (workers or cores())
 
 
 def readings(gun: GunParameters) -> dict[str, Method]:

@@ -126,6 +126,14 @@ def prepared(name: str, seed: int, observer: Observer | None = None) -> Reproduc
     return replace(study, answering=answering, notes=notes)
 
 
+_RUN_S, _REPORT_S = 0.12, 6.0
+
+
+def reproduction_time_s(study: ReproducedStudy) -> float:
+    """About how long a reproduction takes."""
+    return _REPORT_S + _RUN_S * len(study.runs)
+
+
 def reproduce(study: ReproducedStudy, out: Path, tell: Tell) -> Reproduced:
     """Run, log, analyse and report a study into `out`.
 
