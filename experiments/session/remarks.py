@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from experiments.design.plan import Trial, without_blanks
 from experiments.tasks.questions import AnswerValue
@@ -117,7 +117,9 @@ def flag_word(typed: str) -> str | None:
     return flag if plain and len(flag) <= MAX_FLAG else None
 
 
-REMARK: TypeAdapter[Remark] = TypeAdapter(Annotated[Remark, Field(discriminator="kind")])
+REMARK: TypeAdapter[Remark] = TypeAdapter(
+    Annotated[Remark, Field(discriminator="kind")], config=ConfigDict(defer_build=True)
+)
 """Reads the remark that a record holds."""
 
 

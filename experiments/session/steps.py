@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import asdict, dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from device.words import ShotTiming
 from experiments.design.plan import Condition, Trial, without_blanks
@@ -332,9 +332,11 @@ _OPTIONAL_FIELDS = (
     "shots",
     "exposure_s",
 )
-STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")])
+STEP: TypeAdapter[Step] = TypeAdapter(Annotated[Step, Field(discriminator="kind")], config=ConfigDict(defer_build=True))
 """Reads the step that a record holds."""
-OUTCOME: TypeAdapter[Outcome] = TypeAdapter(Annotated[Outcome, Field(discriminator="kind")])
+OUTCOME: TypeAdapter[Outcome] = TypeAdapter(
+    Annotated[Outcome, Field(discriminator="kind")], config=ConfigDict(defer_build=True)
+)
 """Reads the outcome that a record holds."""
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, StringConstraints, TypeAdapter, ValidationError
+from pydantic import AfterValidator, ConfigDict, Field, StringConstraints, TypeAdapter, ValidationError
 
 from experiments.clock import Clock
 from experiments.config.door import Model, Text
@@ -81,7 +81,9 @@ class SetAside(Model):
 
 RegisterEntry = Joined | Excluded | Readmitted | SetAside
 _REASON: TypeAdapter[str] = TypeAdapter(_Reason)
-_ENTRY: TypeAdapter[RegisterEntry] = TypeAdapter(Annotated[RegisterEntry, Field(discriminator="kind")])
+_ENTRY: TypeAdapter[RegisterEntry] = TypeAdapter(
+    Annotated[RegisterEntry, Field(discriminator="kind")], config=ConfigDict(defer_build=True)
+)
 
 
 def entry(kind: str, participant_id: str, **body: object) -> RegisterEntry:
