@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
-from scipy.sparse.csgraph import connected_components
-from scipy.special import log_expit, log_ndtr, logsumexp, ndtri, stdtrit
 
 from analysis.stats.arrays import FloatArray, numbers, one_of, row_labels, share
 from analysis.stats.frames import Result
@@ -102,12 +100,15 @@ def paired_scores(
     fit, covariance = found
     basis, people = _basis(len(items)), len(wins_of)
     scores, ses = basis @ fit[: len(items) - 1], _errors(basis, covariance)
-    reach = float(ndtri((1 + level) / 2)) * ses
+    reach = float(scipy.special.ndtri((1 + level) / 2)) * ses
     if people > 1:
         slopes = _slopes(fit, wins_of, ties_of, model)
         between = np.asarray(covariance @ slopes.T @ slopes @ covariance * people / (people - 1))
         robust = _errors(basis, between)
-        ses, reach = np.maximum(ses, robust), np.maximum(reach, stdtrit(people - 1, (1 + level) / 2) * robust)
+        ses, reach = (
+            np.maximum(ses, robust),
+            np.maximum(reach, scipy.special.stdtrit(people - 1, (1 + level) / 2) * robust),
+        )
     return PairedScores(
         model=model,
         people=people,
@@ -197,10 +198,10 @@ def _checked(items: Sequence[Hashable], counts: ArrayLike, name: str) -> FloatAr
 
 def _not_connected(items: Sequence[Hashable], won: FloatArray) -> str:
     """Why there are no scores; empty if each item can be reached from each other by choices."""
-    parts, part = connected_components(won > 0, directed=True, connection="strong")
+    parts, part = scipy.sparse.csgraph.connected_components(won > 0, directed=True, connection="strong")
     if parts == 1:
         return ""
-    apart, group = connected_components(won > 0, directed=False)
+    apart, group = scipy.sparse.csgraph.connected_components(won > 0, directed=False)
     if apart > 1:
         return f"never compared with each other: {_named(items, group)}"
     return f"never chosen over the others, or always: {_named(items, part)}; one more choice the other way would do"
@@ -229,23 +230,23 @@ def _terms(at: FloatArray, n: int, model: PairModel, *, with_ties: bool) -> tupl
     scores = _basis(n) @ at[: n - 1]
     difference = scores[:, None] - scores
     if not with_ties:
-        chosen = log_expit(difference) if model == "bradley-terry" else log_ndtr(difference)
+        chosen = scipy.special.log_expit(difference) if model == "bradley-terry" else scipy.special.log_ndtr(difference)
         return chosen, np.zeros_like(chosen)
     if model == "bradley-terry":
         middle = at[-1] + np.zeros_like(difference)
-        total = logsumexp([difference / 2, -difference / 2, middle], axis=0)
+        total = scipy.special.logsumexp([difference / 2, -difference / 2, middle], axis=0)
         chosen, drawn = difference / 2 - total, middle - total
     else:
         reach = np.exp(at[-1])
-        chosen = log_ndtr(difference - reach)
-        upper, lower = log_ndtr(reach - difference), log_ndtr(-reach - difference)
+        chosen = scipy.special.log_ndtr(difference - reach)
+        upper, lower = scipy.special.log_ndtr(reach - difference), scipy.special.log_ndtr(-reach - difference)
         drawn = upper + np.log(np.maximum(-np.expm1(lower - upper), np.exp(_LEAST)))
     return chosen, drawn
 
 
 def _maximum(loss: Callable[[FloatArray], float], start: FloatArray) -> FloatArray:
     """The minimum of a convex loss, by quasi-Newton steps and then Newton's own until they are tiny."""
-    at = np.asarray(minimize(loss, start, method="BFGS").x)
+    at = np.asarray(scipy.optimize.minimize(loss, start, method="BFGS").x)
     for _ in range(_POLISHED):
         step = np.linalg.solve(_curvature(loss, at), _gradient(loss, at))
         at = at - step
