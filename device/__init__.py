@@ -51,6 +51,8 @@ def open_gun(
 ) -> Gun:
     """A disarmed gun at `address`, "simulated" or "serial:PORT"; "serial:auto" looks for the one that answers.
 
+    "NAME:..." is the gun that a plug-in of this name brings (`device.plugin`), behind the same limits.
+
     `parameters`: the rendering methods by name, or a gun from which the paper's three are made (the paper's gun if
     None). `LinkError`: the gun does not answer. `ValueError`: no such form of address.
 
@@ -67,7 +69,9 @@ def open_gun(
 
         return open_serial(address, _methods(parameters), clock)
     if address != "simulated":
-        raise ValueError(f'address is {address!r}; it must be "simulated" or "serial:PORT"')
+        from device.plugin.door import open_plugin  # noqa: PLC0415
+
+        return open_plugin(address, _methods(parameters), clock)
     from device.simulated import SimulatedGun  # noqa: PLC0415
 
     return SimulatedGun(_methods(parameters), clock)

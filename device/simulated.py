@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method, Rendering, rendering_of
-from device.words import Drive, GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
+from device.words import Drive, GunState, GunStatus, Identity, LimitError, LinkError, Shot, ShotReport, judged
 
 MODEL_VERSION = "1"
 """Counts up whenever the same shot would be predicted otherwise."""
@@ -44,8 +44,7 @@ class SimulatedGun:
         self._is_open()
         if not self._armed:
             raise LimitError("the gun is disarmed; arm it before it may fire")
-        if not isinstance(shot, Shot):
-            raise LimitError(f"shot is {shot!r}; it must be a Shot")
+        shot = judged(shot)
         rendering = self._render(shot)
         now_s = self._clock()
         onset_s = planned_start_s(now_s, at_s)

@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from typing import Literal, Protocol, TypeGuard, get_args
 
@@ -165,6 +165,14 @@ class Shot:
             raise LimitError(f"shot: direction is {self.direction!r}; it must be one of {', '.join(DIRECTIONS)}")
         if not isinstance(self.drive, Pulse | Effect):
             raise LimitError(f"shot: drive is {self.drive!r}; it must be a Pulse or an Effect")
+
+
+def judged(shot: object) -> Shot:
+    """A shot judged again, as each gun does before it fires: a frozen value can be forced. `LimitError`: it is none."""
+    if not isinstance(shot, Shot):
+        raise LimitError(f"shot is {shot!r}; it must be a Shot")
+    once = replace(shot)
+    return replace(once, drive=replace(once.drive))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,7 +21,7 @@ version = release = version_of("recoil")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosectionlabel"]
 autosectionlabel_prefix_document = True
-exclude_patterns = ["_build", "notebooks", "pictures"]
+exclude_patterns = ["_build", "examples", "notebooks", "pictures"]
 suppress_warnings = [
     "autosectionlabel.*",  # pages that repeat a title are linked as a whole
 ]

@@ -109,12 +109,15 @@ class Examination:
     checks: tuple[DoctorFinding, ...]
 
 
-def examine(results: Path, gun: str, config: str, progress: Progress) -> Examination:
-    """Carry out every check; `config` is the gun's, with the limit of its line.
+def examine(results: Path, gun: str, config: str, progress: Progress, shots: int = 0) -> Examination:
+    """Carry out every check; `config` is the gun's, with the limit of its line. With `shots` the gun is fired.
 
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
-    findings, planned = list[DoctorFinding](), checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s)
+    findings, planned = (
+        list[DoctorFinding](),
+        checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s, shots),
+    )
     with progress("doctor", len(planned)) as tell:
         for check in planned:
             findings += carry_out_check(check)

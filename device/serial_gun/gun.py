@@ -223,8 +223,10 @@ def parse(address: str) -> Address:
 
 
 def speed_of(address: str) -> float | None:
-    """How many times faster than the world a serial gun's clock goes; None if the address is no serial gun's."""
-    return parse(address).speed if address.startswith(SCHEME) else None
+    """How many times faster than the world a gun's clock goes; None of the simulated one, whose shots take no time."""
+    if address == "simulated":
+        return None
+    return parse(address).speed if address.startswith(SCHEME) else 1.0
 
 
 def _speed(text: str) -> float:

@@ -14,7 +14,7 @@ from typing import Final
 from device.methods import Method, Rendering, rendering_of
 from device.serial_gun.lines import MAX_DRIFT, Contradiction, CutShort, HostTime, Reply
 from device.wire.records import METHOD_NAME, Setting, ShotRecord, StatusRecord, Way
-from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot, ShotReport, ShotTiming
+from device.words import Direction, Drive, Effect, LimitError, Pulse, Shot, ShotReport, ShotTiming, judged
 
 FLOORS_US: Final = {"PULS": 50_000, "EFF": 10_000}
 """The firmware's least time from onset to onset (`PROTOCOL.md`)."""
@@ -59,6 +59,7 @@ class ShotOrder:
 
 def asked(shot: Shot, methods: Mapping[str, Method]) -> ShotRequest:
     """A shot as it can be said. `LimitError`: no such method, a drive of another kind, or no way home by the model."""
+    shot = judged(shot)
     if shot.method not in methods:
         raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(methods)}")
     if METHOD_NAME.fullmatch(shot.method) is None:

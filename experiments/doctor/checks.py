@@ -28,6 +28,7 @@ from typing import IO, TypeVar
 from pydantic import TypeAdapter
 
 from device import DeviceError, open_gun
+from device.plugin.conformance import conformance, rig_at
 from device.serial_gun.gun import speed_of
 from experiments.clock import RealClock
 from experiments.doctor import verdicts
@@ -171,13 +172,17 @@ class Check:
     look: Callable[[], tuple[DoctorFinding, ...]]
 
 
-def checks(results: Path, gun: str, limit_s: float) -> tuple[Check, ...]:
-    """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back."""
+def checks(results: Path, gun: str, limit_s: float, shots: int = 0) -> tuple[Check, ...]:
+    """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back.
+
+    With `shots` the gun is fired, in so many trials: nobody is to hold it.
+    """
     looks: dict[str, Callable[[], tuple[DoctorFinding, ...]]] = {
         "machine": lambda: (verdicts.of_machine(machine()),),
         "clock": lambda: (verdicts.of_clock(ticks()),),
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
+        **({"shots": partial(_shots, gun, shots)} if shots else {}),
         "USB adapter": lambda: (verdicts.of_adapters(adapters()),),
         "display": partial(_on_display, "display", "display"),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
@@ -221,6 +226,22 @@ def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
         return (verdicts.of_link(within_seconds(DEADLINE_S, partial(gun_line, address)), limit_s),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
+
+
+SHOT_S = 1.0
+"""A trial takes no longer, and the other checks of the kit no longer than twenty."""
+
+
+def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
+    """What every gun keeps, tried on this one."""
+    try:
+        rig = rig_at(address, trials=trials)
+        kept = within_seconds((trials + 20) * SHOT_S + DEADLINE_S, lambda: conformance(rig))
+    except ValueError as error:
+        raise PlaceError(f"--gun {address}: {error}") from error
+    except OSError as error:
+        return (verdicts.of_failure("shots", str(error)),)
+    return (verdicts.of_conformance(kept),)
 
 
 def _on_display(name: str, program: str, seconds: float = DEADLINE_S) -> tuple[DoctorFinding, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+from device.plugin.conformance import ConformanceFinding
 from experiments.doctor import figures
 from experiments.record.journal import Record, read_as
 from experiments.session.steps import OUTCOME, STEP, Answered, Fired, Outcome, Present
@@ -179,6 +180,16 @@ def of_link_failure(reason: str) -> figures.DoctorFinding:
     """A gun that does not answer."""
     advice = "check power, cable and port; on Linux you must be in the group dialout"
     return figures.DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
+
+
+def of_conformance(found: Sequence[ConformanceFinding]) -> figures.DoctorFinding:
+    """Whether the gun keeps what every gun keeps, by `device.plugin.conformance`."""
+    measured = "; ".join(f"{one.check}: {one.said}" for one in found if not one.kept)
+    advice = "nobody may hold this gun: it does not keep what every gun keeps; mend it, or the plug-in that brings it"
+    if measured:
+        return figures.DoctorFinding(check="shots", verdict="fails", measured=measured, advice=advice)
+    measured = "; ".join(f"{one.check}: {one.said}" for one in found)
+    return figures.DoctorFinding(check="shots", verdict="good", measured=measured, advice="")
 
 
 def of_adapters(found: Sequence[figures.Adapter]) -> figures.DoctorFinding:

@@ -109,7 +109,10 @@ def twin(
 
 def doctor(
     results: Annotated[Path, typer.Option(help="Folder for the logs, and its console runs.")] = Path("results"),
-    gun: Annotated[str, typer.Option(help="`simulated` or `serial:PORT`. It is not fired.")] = "simulated",
+    gun: Annotated[str, typer.Option(help="`simulated`, `serial:PORT` or a plug-in's `NAME:...`.")] = "simulated",
+    fire: Annotated[
+        int, typer.Option(min=0, metavar="TRIALS", help="Fire it so often, and see that it keeps what every gun keeps.")
+    ] = 0,
     gun_config: Annotated[
         str,
         typer.Option(help="Config of the gun, with the limit of its line's round trip (serial.round_trip_limit_s)."),
@@ -120,7 +123,7 @@ def doctor(
     """The rig's self-test: what was measured, and what to do about what is not good."""
     from recoil import rig as feature
 
-    found = feature.examine(results, gun, gun_config, progress)
+    found = feature.examine(results, gun, gun_config, progress, fire)
     show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)

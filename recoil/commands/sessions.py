@@ -37,7 +37,7 @@ def check(
 ParticipantOption = Annotated[
     str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
 ]
-GunAddressOption = Annotated[str, typer.Option(help="`simulated` or `serial:PORT`.")]
+GunAddressOption = Annotated[str, typer.Option(help="`simulated`, `serial:PORT` or a plug-in's `NAME:...`.")]
 ScreenOption = Annotated[ScreenChoice, typer.Option(help="Where the run takes place.")]
 ResultsOption = Annotated[Path, typer.Option(help="Folder for the logs.")]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")]

@@ -1,0 +1,316 @@
+"""The guard before a gun that is not ours: the limits and the latch are here, whatever the plug-in says or does.
+
+A command that breaks a limit, or comes while the gun is disarmed, never reaches the plug-in. What the plug-in answers
+is believed only if it fits the command and the clock, and each of its calls has a deadline.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, wait
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TypeVar
+
+from device.limits import DriveHistory, planned_start_s
+from device.methods import Method, Rendering, rendering_of
+from device.words import (
+    Gun,
+    GunStatus,
+    Identity,
+    LimitError,
+    LinkError,
+    Pulse,
+    Shot,
+    ShotReport,
+    is_finite,
+    is_whole_number,
+    judged,
+)
+
+ANSWER_S = 2.0
+"""So long a plug-in may take for anything but a shot's own time. Assumed."""
+HANDED_OVER_S = 0.05
+"""So long before its time a shot is handed to the plug-in; until then the guard alone waits. Assumed: a train's shots
+are asked for 30 ms ahead, so none of a run waits here."""
+CLOCK_SLACK_S = 0.001
+"""So much a plug-in's times may lie outside of what this machine's clock allows. Assumed."""
+LENGTH_SLACK_S, LENGTH_SLACK_PART = 0.0002, 0.02
+"""So much a pulse may be longer or shorter than ordered: as on the wire, where more is told as late or cut."""
+LONGEST_READY_S = 60.0
+"""So far ahead a plug-in may put its next shot: as long as the limit of shots a minute can make one wait."""
+
+_Answer = TypeVar("_Answer")
+
+
+class PluginError(LinkError):
+    """A plug-in that is refused, that broke off, did not answer in time, or says what cannot be."""
+
+
+def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
+    """What an act gives back, or raises. `TimeoutError`: it takes longer; it is then left to itself."""
+    done: Future[_Answer] = Future()
+
+    def carry_out() -> None:
+        try:
+            done.set_result(act())
+        except Exception as error:  # noqa: BLE001 - raised again where it is waited for
+            done.set_exception(error)
+        except BaseException as error:  # noqa: BLE001 - SystemExit and the like end no program of ours
+            done.set_exception(RuntimeError(repr(error)))
+
+    threading.Thread(target=carry_out, daemon=True, name="plug-in").start()
+    wait([done], seconds)
+    if not done.done():
+        raise TimeoutError(f"no answer within {seconds:g} s")
+    return done.result()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PluginOrder:
+    """One shot as it was handed over: when it was asked for, when it is due, and what the model says of it."""
+
+    shot: Shot
+    requested_s: float
+    start_s: float
+    rendering: Rendering
+
+    @property
+    def longest_s(self) -> float:
+        """How long it may be driven: a pulse's length, a vibration's duration."""
+        drive = self.shot.drive
+        return drive.pulse_s if isinstance(drive, Pulse) else self.rendering.settle_s
+
+
+class GuardedGun:
+    """A plug-in's `Gun` behind the guard; `name` is what `--gun` calls it.
+
+    Commands may come from any thread. `disarm` overtakes: nothing that was asked for before it arms or fires after it.
+    """
+
+    def __init__(self, name: str, gun: Gun, methods: Mapping[str, Method], clock: Callable[[], float]) -> None:
+        self.name = name
+        self._gun, self._methods, self._clock = gun, MappingProxyType(dict(methods)), clock
+        self._turn = threading.Lock()  # of arm and fire
+        self._told = threading.Condition()  # guards the four below
+        self._armed = self._closed = False
+        self._disarms = 0
+        self._silent = ""  # the call that it never answered
+        self._history = DriveHistory()
+        try:
+            self._check_disarmed("when it is opened; a gun is born disarmed")
+        except LinkError:
+            self._let_go()
+            raise
+
+    def identify(self) -> Identity:
+        """Who answers. `LinkError` after `close`."""
+        self._is_open()
+        return self._identity(self._ask("identify", self._gun.identify))
+
+    def arm(self) -> None:
+        """Allow the next shots. `LinkError`: it does not answer, or was disarmed meanwhile."""
+        with self._told:
+            disarms = self._disarms
+        self._is_open()
+        with self._turn:
+            self._ask("arm", self._gun.arm)
+            with self._told:
+                self._armed = self._disarms == disarms and not self._closed
+            if not self._armed:
+                self._disarm_it()
+                raise PluginError(f"gun plug-in {self.name} was disarmed while it was to be armed")
+
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+        """Fire once, now or at a time on the host's clock, at most 2 s ahead.
+
+        `LimitError`: refused by the guard, of which the plug-in hears nothing, or by the plug-in. `LinkError`: the
+        outcome is unknown, or what the plug-in says of it cannot be; the gun is then disarmed.
+        """
+        with self._told:
+            disarms = self._disarms
+        self._is_open()
+        with self._turn:
+            self._is_armed(disarms)
+            order = self._order(shot, at_s)
+            self._wait_for(order, disarms)
+            return self._fire(order, at_s)
+
+    def disarm(self) -> None:
+        """Forbid shots, from every state and thread. `LinkError`: the plug-in does not do it; the guard fires none."""
+        with self._told:
+            self._armed = False
+            self._disarms += 1
+            self._told.notify_all()
+        self._disarm_it()
+        if not self._turn.locked():  # else an arming or a shot is under way, whose end is disarmed as well
+            self._check_disarmed("after it was disarmed; switch off its power")
+
+    def status(self) -> GunStatus:
+        """The gun at this moment, never readier or cooler than by the guard's own count."""
+        if self._closed:
+            return self._status(GunStatus(state="disarmed", shots=0, coil_temperature_C=0.0, ready_at_s=0.0))
+        found = self._status(_checked_status(self.name, self._ask("status", self._gun.status), self._clock()))
+        if found.state in {"armed", "resetting"} and not self._armed:
+            return replace(found, state="fault", fault="it says that it is armed, and it was not told so")
+        return found
+
+    def close(self) -> None:
+        """Disarm, and let go of the gun."""
+        if self._closed:
+            return
+        try:
+            self.disarm()
+        finally:
+            self._let_go()
+
+    # what is asked of the plug-in
+
+    def _ask(self, what: str, act: Callable[[], _Answer], seconds: float = ANSWER_S) -> _Answer:
+        """One call, with its deadline. `PluginError`: it broke off or is silent; then it is asked no more."""
+        if self._silent and what != "disarm":
+            raise PluginError(f"gun plug-in {self.name} never answered {self._silent}; switch off the gun, start anew")
+        try:
+            return answer_within(seconds, act)
+        except (LimitError, LinkError):
+            raise
+        except TimeoutError as error:
+            self._silent = self._silent or what
+            raise PluginError(f"gun plug-in {self.name}: {what}: {error}") from error
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            raise PluginError(f"gun plug-in {self.name} broke off in {what}: {said}") from error
+
+    def _disarm_it(self) -> None:
+        self._ask("disarm", self._gun.disarm)
+
+    def _check_disarmed(self, when: str) -> None:
+        state = _checked_status(self.name, self._ask("status", self._gun.status), self._clock()).state
+        if state in {"armed", "resetting"} and not self._armed:
+            raise PluginError(f"gun plug-in {self.name} says that it is {state} {when}")
+
+    def _let_go(self) -> None:
+        self._closed = True
+        self._ask("close", self._gun.close)
+
+    def _identity(self, said: object) -> Identity:
+        if isinstance(said, Identity) and all(map(_is_text, (said.model, said.version, said.serial))):
+            return said
+        raise PluginError(f"gun plug-in {self.name} identifies as {said!r}; it must be an Identity of three texts")
+
+    # a shot
+
+    def _order(self, shot: Shot, at_s: float | None) -> PluginOrder:
+        """The shot as it may be handed over. `LimitError` as every gun's."""
+        shot = judged(shot)
+        if shot.method not in self._methods:
+            raise LimitError(f"method is {shot.method!r}; this gun renders {', '.join(self._methods)}")
+        rendering = rendering_of(self._methods[shot.method], shot.drive)
+        now_s = self._clock()
+        start_s = planned_start_s(now_s, at_s)
+        self._history.check(rendering.load, start_s)
+        return PluginOrder(shot=shot, requested_s=now_s, start_s=start_s, rendering=rendering)
+
+    def _wait_for(self, order: PluginOrder, disarms: int) -> None:
+        """Until the shot is to be handed over. `LimitError`: disarmed meanwhile."""
+        with self._told:
+            wait_s = order.start_s - order.requested_s - HANDED_OVER_S
+            self._told.wait_for(lambda: not self._armed or self._disarms != disarms, max(0.0, wait_s))
+        self._is_armed(disarms)
+
+    def _fire(self, order: PluginOrder, at_s: float | None) -> ShotReport:
+        """Hand it over. Whatever becomes of it, but a refusal, is taken for a shot."""
+        seconds = max(0.0, order.start_s - self._clock()) + order.longest_s + ANSWER_S
+        try:
+            report = self._ask("fire", lambda: self._gun.fire(order.shot, at_s), seconds)
+            broken = broken_rule(order, report, self._clock())
+            if broken:
+                raise PluginError(f"gun plug-in {self.name}: {broken}; the shot does not count")
+        except LimitError:
+            raise
+        except BaseException:  # an interrupt too
+            self._spend(order, self._clock())
+            self.disarm()
+            raise
+        self._spend(order, report.pulse_start_s)
+        home_s = max(report.home_predicted_s, report.pulse_start_s + order.rendering.settle_s)
+        return replace(report, requested_s=order.requested_s, home_predicted_s=home_s)
+
+    def _spend(self, order: PluginOrder, start_s: float) -> None:
+        load = order.rendering.load
+        start_s = max(start_s, order.start_s, self._history.earliest_s(load))
+        self._history = self._history.record(load, start_s, start_s + order.rendering.settle_s)
+
+    def _status(self, said: GunStatus) -> GunStatus:
+        return replace(
+            said,
+            coil_temperature_C=max(said.coil_temperature_C, self._history.coil_celsius(self._clock())),
+            ready_at_s=max(said.ready_at_s, self._history.ready_s),
+        )
+
+    def _is_open(self) -> None:
+        if self._closed:
+            raise PluginError(f"gun plug-in {self.name} is closed; open it again")
+
+    def _is_armed(self, disarms: int) -> None:
+        with self._told:
+            if not self._armed or self._disarms != disarms:
+                raise LimitError("the gun is disarmed; arm it before it may fire")
+
+
+def broken_rule(order: PluginOrder, report: object, now_s: float) -> str:
+    """The first rule that a plug-in's report breaks, with its values; empty if there is none."""
+    if not isinstance(report, ShotReport):
+        return f"fire gave back {report!r}; it must be a ShotReport"
+    if report.shot != order.shot:
+        return f"it reports {report.shot}; ordered was {order.shot}"
+    times = (report.pulse_start_s, report.pulse_end_s, report.home_predicted_s)
+    if not all(map(is_finite, times)):
+        return f"its times are {', '.join(map(repr, times))}; they must be finite seconds of the host's clock"
+    early_s, late_s = order.start_s - CLOCK_SLACK_S, max(order.start_s, now_s) + HANDED_OVER_S
+    if not early_s <= report.pulse_start_s <= late_s:
+        return (
+            f"it reports an onset at {report.pulse_start_s:.6f} s; it must lie between {early_s:.6f} s, when the shot "
+            f"was due, and {late_s:.6f} s, when it was reported"
+        )
+    return _broken_length(order, report)
+
+
+def _broken_length(order: PluginOrder, report: ShotReport) -> str:
+    length_s, longest_s = report.pulse_end_s - report.pulse_start_s, order.longest_s
+    slack_s = max(LENGTH_SLACK_S, LENGTH_SLACK_PART * longest_s)
+    shortest_s = longest_s if isinstance(order.shot.drive, Pulse) else 0.0
+    if not shortest_s - slack_s <= length_s <= longest_s + slack_s:
+        return f"it reports a drive of {length_s:.6f} s; ordered was {longest_s:.6f} s"
+    if report.home_predicted_s < report.pulse_end_s:
+        return f"it is home at {report.home_predicted_s:.6f} s, before its drive ends at {report.pulse_end_s:.6f} s"
+    if not _is_text(report.motion):
+        return f"its motion is {report.motion!r}; it must be text"
+    return ""
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+_STATES = ("disarmed", "armed", "resetting", "fault")
+
+
+def _checked_status(name: str, said: object, now_s: float) -> GunStatus:
+    """What a plug-in says of itself, if it can be. `PluginError` names the field."""
+    broken = ""
+    if not isinstance(said, GunStatus):
+        broken = f"{said!r}; it must be a GunStatus"
+    elif said.state not in _STATES:
+        broken = f"state {said.state!r}; it must be one of {', '.join(_STATES)}"
+    elif not (is_whole_number(said.shots) and said.shots >= 0):
+        broken = f"shots {said.shots!r}; it must be a whole number of at least 0"
+    elif not is_finite(said.coil_temperature_C):
+        broken = f"coil_temperature_C {said.coil_temperature_C!r}; it must be finite"
+    elif not (said.ready_at_s == -math.inf or is_finite(said.ready_at_s)) or said.ready_at_s > now_s + LONGEST_READY_S:
+        broken = f"ready_at_s {said.ready_at_s!r}; it must be at most {LONGEST_READY_S:g} s ahead of {now_s:.3f}"
+    if broken or not isinstance(said, GunStatus):
+        raise PluginError(f"gun plug-in {name} gives as its status {broken}")
+    return said

@@ -1,0 +1,7 @@
+"""The gun keeps what every gun keeps: `pytest`, after `pip install .`."""
+
+from device.plugin.conformance import broken, conformance, rig_at
+
+
+def test_without_a_card_it_keeps_what_every_gun_keeps() -> None:
+    assert broken(conformance(rig_at("sound-card:null"))) == []

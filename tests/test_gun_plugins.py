@@ -1,0 +1,347 @@
+"""Guns that other packages bring: what is let in, what the guard believes, and what every gun keeps."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from device import GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
+from device.methods import paper_methods
+from device.plugin import door, guard
+from device.plugin.conformance import CHECKS, ConformanceRig, StillClock, broken, conformance, rig_at
+from device.plugin.guard import GuardedGun, PluginError
+from device.simulated import SimulatedGun
+from experiments import run as runs
+from experiments.clock import RealClock
+from experiments.load import load_setup
+from experiments.record.journal import read_journal
+from experiments.screens.synthetic import synthetic_screen
+from tests.firmware import emulated
+from tests.gun_plugins import install, install_sound_card
+from tests.twins import a_shot, a_twin
+
+TRIALS = 8
+
+
+@pytest.fixture(scope="module")
+def sound_card(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with pytest.MonkeyPatch.context() as patch:
+        install_sound_card(patch, tmp_path_factory.mktemp("plugins"))
+        yield "sound-card:null"
+
+
+# the kit
+
+
+def test_the_simulated_gun_keeps_what_every_gun_keeps():
+    assert broken(conformance(rig_at("simulated", trials=TRIALS))) == []
+
+
+def test_the_twin_keeps_it(tmp_path):
+    with a_twin(tmp_path, speed=20.0) as (twin, socket):
+        rig = rig_at(
+            f"serial:{socket.address}?speed=20", trials=TRIALS, break_it=lambda: twin.core.fail(1, twin.clock_us())
+        )
+        assert broken(conformance(rig)) == []
+
+
+@pytest.mark.slow
+def test_the_firmware_keeps_it(tmp_path):
+    with emulated(tmp_path, "gun-qemu-10.elf") as chip:
+        rig = rig_at(f"serial:{chip.port}?speed=10", trials=TRIALS, break_it=lambda: chip.fail(1))
+        assert broken(conformance(rig)) == []
+
+
+def test_a_plug_in_keeps_it(sound_card):
+    import sound_card_gun
+
+    with pytest.MonkeyPatch.context() as patch:
+
+        def pull_the_plug() -> None:
+            patch.setattr(sound_card_gun.Null, "play", lambda *_: 1 / 0)
+
+        rig = rig_at(sound_card, trials=TRIALS, speed=10.0, break_it=pull_the_plug)
+        assert broken(conformance(rig)) == []
+
+
+# what is let in
+
+HANGS = "import time\ntime.sleep(3600)\n"
+GUN = """
+class Gun:
+    def identify(self): ...
+    def arm(self): ...
+    def fire(self, shot, at_s=None): ...
+    def disarm(self): ...
+    def status(self): ...
+    def close(self): ...
+    {more}
+
+def open_gun(address, methods, clock):
+    return {made}
+"""
+
+
+def test_a_plug_in_that_hangs_at_import_is_refused_by_name(tmp_path, monkeypatch):
+    install(monkeypatch, tmp_path, HANGS, name="sleeper", module="sleeper_gun")
+    with pytest.raises(PluginError, match=r"gun plug-in sleeper: its import did not end within 1 s; .* uninstall it"):
+        door.try_import("sleeper", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n", "its import was killed by signal 9"),
+        ("import sys\nsys.exit('no card')\n", "its import failed: no card"),
+        ("1 / 0\n", "its import failed: ZeroDivisionError: division by zero"),
+        ("", "its import failed: AttributeError: .*open_gun"),
+        ("open_gun = 3\n", "its import failed: TypeError: the entry point is 3; it must be a function of"),
+        ("def open_gun(address): ...\n", "its import failed: TypeError: too many positional arguments"),
+    ],
+)
+def test_a_plug_in_that_cannot_be_imported_is_refused_by_name(tmp_path, monkeypatch, source, said):
+    install(monkeypatch, tmp_path, source, name="bad", module="bad_gun")
+    with pytest.raises(PluginError, match=f"gun plug-in bad: {said}"):
+        open_gun("bad:1")
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        (GUN.format(more="arm = None", made="Gun()"), "Gun has no arm; a gun has identify, arm, fire"),
+        (GUN.format(more="def fire(self, shot): ...", made="Gun()"), r"it cannot be called as fire\(shot, at_s\)"),
+        (GUN.format(more="", made="None"), "NoneType has no identify, arm, fire, disarm, status, close"),
+        (GUN.format(more="", made="1 / 0"), "did not open '1': ZeroDivisionError"),
+        (GUN.format(more="", made="Gun()"), "gives as its status None; it must be a GunStatus"),
+    ],
+)
+def test_what_a_plug_in_opens_must_be_a_gun(tmp_path, monkeypatch, source, said):
+    install(monkeypatch, tmp_path, source, name="bad", module="bad_gun")
+    monkeypatch.setattr(door, "try_import", lambda _: None)
+    with pytest.raises(PluginError, match=f"gun plug-in bad:? ?{said}"):
+        open_gun("bad:1")
+
+
+def test_two_packages_with_one_name_are_both_named(tmp_path, monkeypatch):
+    for package in ("one", "two"):
+        install(monkeypatch, tmp_path, "", name="same", module=f"{package}_gun", package=package)
+    with pytest.raises(PluginError, match="several packages bring it: one, two; uninstall all but one"):
+        open_gun("same:")
+
+
+def test_no_plug_in_takes_the_name_of_a_gun_of_ours_and_those_that_are_there_are_told(
+    tmp_path, monkeypatch, sound_card
+):
+    install(monkeypatch, tmp_path, "1 / 0\n", name="simulated", module="false_gun")
+    assert open_gun("simulated").identify().model == "simulated"
+    assert "simulated" not in door.plugin_names()
+    with pytest.raises(ValueError, match=r"address is 'usb'; .*plug-in that is installed beside Recoil .sound-card."):
+        open_gun("usb:1")
+
+
+def test_a_plug_in_that_never_opens_is_refused(tmp_path, monkeypatch):
+    install(
+        monkeypatch, tmp_path, GUN.format(more="", made="__import__('time').sleep(9)"), name="slow", module="slow_gun"
+    )
+    monkeypatch.setattr(door, "try_import", lambda _: None)
+    monkeypatch.setattr(door, "OPEN_S", 0.05)
+    with pytest.raises(PluginError, match=r"gun plug-in slow did not open '': TimeoutError: no answer within 0.05 s"):
+        open_gun("slow")
+
+
+# what the guard believes, and what it lets through
+
+
+class Liar(SimulatedGun):
+    """A gun that does not do as it says, in one way; it notes what it hears, and knows no limit at all."""
+
+    def __init__(self, clock: Any, **lie: Any) -> None:
+        super().__init__(paper_methods(), clock)
+        self.lie, self.heard, self.is_armed = lie, list[Shot](), False
+
+    def arm(self) -> None:
+        self.is_armed = True
+
+    def disarm(self) -> None:
+        self.is_armed = self.lie.get("stays_armed", False)
+
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+        self.heard.append(shot)
+        if "acts" in self.lie:
+            return self.lie["acts"]()
+        start_s = self._clock() if at_s is None else at_s
+        true = ShotReport(
+            shot=shot,
+            requested_s=start_s,
+            pulse_start_s=start_s,
+            pulse_end_s=start_s + 0.01,
+            home_predicted_s=start_s + 0.3,
+            motion="home",
+        )
+        return replace(true, **self.lie.get("report", {}))
+
+    def status(self) -> GunStatus:
+        state = "armed" if self.is_armed else "disarmed"
+        true = GunStatus(state=state, shots=len(self.heard), coil_temperature_C=25.0, ready_at_s=0.0)
+        return replace(true, **self.lie.get("status", {}))
+
+
+@pytest.fixture
+def clock():
+    clock = StillClock()
+    clock.wait(100.0)
+    return clock
+
+
+def guarded(clock: Any, **lie: Any) -> tuple[GuardedGun, Liar]:
+    liar = Liar(clock, **lie)
+    gun = GuardedGun("liar", liar, paper_methods(), clock)
+    gun.arm()
+    return gun, liar
+
+
+@pytest.mark.parametrize(
+    ("report", "said"),
+    [
+        ({"pulse_end_s": 100.05}, "it reports a drive of 0.050000 s; ordered was 0.010000 s"),
+        ({"pulse_end_s": 100.001}, "it reports a drive of 0.001000 s"),
+        ({"pulse_start_s": 40.0, "pulse_end_s": 40.01}, "it reports an onset at 40.000000 s"),
+        ({"pulse_start_s": 9e15, "pulse_end_s": 9e15}, "it reports an onset at 9"),
+        ({"pulse_start_s": float("nan")}, "they must be finite"),
+        ({"home_predicted_s": 99.0}, "it is home at 99.000000 s, before its drive ends"),
+        ({"motion": None}, "its motion is None"),
+        ({"shot": a_shot("vibration")}, "ordered was Shot"),
+    ],
+)
+def test_a_report_that_cannot_be_is_not_believed_and_the_gun_is_disarmed(clock, report, said):
+    gun, liar = guarded(clock, report=report)
+    with pytest.raises(LinkError, match=f"gun plug-in liar: .*{said}.*does not count"):
+        gun.fire(a_shot())
+    assert not liar.is_armed
+    gun.arm()
+    with pytest.raises(LimitError, match="not home yet"):  # it may have been fired
+        gun.fire(a_shot())
+
+
+@pytest.mark.parametrize("acts", [lambda: None, lambda: 1 / 0, lambda: (_ for _ in ()).throw(SystemExit(3))])
+def test_a_plug_in_that_breaks_off_is_a_link_that_failed(clock, acts):
+    gun, liar = guarded(clock, acts=acts)
+    with pytest.raises(PluginError, match="gun plug-in liar"):
+        gun.fire(a_shot())
+    assert not liar.is_armed
+
+
+def test_a_plug_in_that_is_silent_is_asked_no_more_but_still_disarmed(clock, monkeypatch):
+    monkeypatch.setattr(guard, "ANSWER_S", 0.05)
+    gun, liar = guarded(clock, acts=threading.Event().wait)
+    with pytest.raises(PluginError, match="liar"):
+        gun.fire(a_shot())
+    assert not liar.is_armed
+    with pytest.raises(PluginError, match="never answered fire"):
+        gun.arm()
+
+
+def test_what_is_beyond_a_limit_is_never_heard_by_the_plug_in(clock):
+    gun, liar = guarded(clock)
+    forged = Pulse(voltage_V=1.0, pulse_s=0.01)
+    object.__setattr__(forged, "voltage_V", 30.0)
+    for shot in (a_shot(drive=forged), a_shot("recoil"), a_shot("vibration"), "bang"):
+        with pytest.raises(LimitError):
+            gun.fire(shot)
+    assert liar.heard == []
+    for _ in range(300):
+        gun.fire(a_shot("asymmetric-1"))
+        with pytest.raises(LimitError, match=r"not home yet|300 shots"):
+            gun.fire(a_shot("asymmetric-1"))
+        clock.wait(0.1999)
+    with pytest.raises(LimitError, match="300 shots in a minute"):
+        gun.fire(a_shot("asymmetric-1"))
+    assert len(liar.heard) == 300
+
+
+def test_after_a_disarming_a_plug_in_that_heeds_none_hears_of_no_shot_not_even_of_one_that_waits():
+    gun, liar = guarded(time.monotonic, stays_armed=False)
+    ended = list[Exception]()
+
+    def wait_for_its_time() -> None:
+        try:
+            gun.fire(a_shot(), time.monotonic() + 1.9)
+        except LimitError as error:
+            ended.append(error)
+
+    waiting = threading.Thread(target=wait_for_its_time)
+    waiting.start()
+    gun.disarm()
+    waiting.join()
+    for _ in range(20):
+        with pytest.raises(LimitError, match="disarmed"):
+            gun.fire(a_shot())
+    assert (len(ended), liar.heard) == (1, [])
+
+
+def test_a_plug_in_that_stays_armed_is_told_of(clock):
+    gun, _ = guarded(clock, stays_armed=True)
+    with pytest.raises(PluginError, match="says that it is armed after it was disarmed; switch off its power"):
+        gun.disarm()
+    assert gun.status().state == "fault"
+
+
+def test_a_plug_in_that_is_born_armed_is_refused(clock):
+    with pytest.raises(PluginError, match="is armed when it is opened; a gun is born disarmed"):
+        GuardedGun("eager", Liar(clock, status={"state": "armed"}), paper_methods(), clock)
+
+
+@pytest.mark.parametrize(
+    ("status", "said"),
+    [
+        ({"state": "ready"}, "state 'ready'"),
+        ({"shots": 1.5}, "shots 1.5"),
+        ({"coil_temperature_C": float("nan")}, "coil_temperature_C nan"),
+        ({"ready_at_s": 1e9}, "ready_at_s 1000000000.0; it must be at most 60 s ahead"),
+    ],
+)
+def test_a_status_that_cannot_be_is_refused_with_its_field(clock, status, said):
+    with pytest.raises(PluginError, match=said):
+        GuardedGun("liar", Liar(clock, status=status), paper_methods(), clock)
+
+
+def test_a_plug_in_is_never_readier_than_the_model(clock):
+    gun, _ = guarded(clock, report={"home_predicted_s": 100.02})
+    home_s = gun.fire(a_shot()).home_predicted_s
+    assert [home_s, gun.status().ready_at_s] == pytest.approx([100.211, 100.211], abs=1e-5)  # as of a simulated gun
+
+
+@pytest.mark.parametrize(
+    ("lie", "check"),
+    [
+        ({"report": {"pulse_end_s": 0.05}}, "trials"),
+        ({"stays_armed": True}, "trials"),
+        ({}, "limits"),
+        ({"status": {"state": "armed"}}, "birth"),
+    ],
+)
+def test_the_kit_finds_a_gun_that_lies_where_no_guard_stands(lie, check):
+    clock = StillClock()
+    rig = ConformanceRig(
+        open_gun=lambda: Liar(clock, **lie), clock=clock, wait=clock.wait, methods=paper_methods(), trials=2
+    )
+    assert [one.check for one in conformance(rig) if not one.kept and one.check == check] == [check]
+    assert set(CHECKS) >= {check}
+
+
+# a run
+
+
+def test_a_run_is_carried_out_on_a_plug_in(tmp_path: Path, sound_card: str) -> None:
+    """On a clock that goes fifty times faster: nobody is to wait for the breaks."""
+    request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
+    finished = runs.run(request, synthetic_screen, RealClock(50.0))
+    journal = read_journal(finished.place.journal)
+    assert journal.finished
+    assert "sound-card:null" in finished.place.journal.read_text()
