@@ -30,8 +30,9 @@ from device.words import (
     judged,
 )
 
-ANSWER_S = 2.0
-"""So long a plug-in may take for anything but a shot's own time. Assumed."""
+ANSWER_S, DISARM_S = 5.0, 2.0
+"""So long a plug-in may take for anything but a shot's own time, and to disarm; a busy machine stands still for some
+of it. Assumed."""
 HANDED_OVER_S = 0.05
 """So long before its time a shot is handed to the plug-in; until then the guard alone waits. Assumed: a train's shots
 are asked for 30 ms ahead, so none of a run waits here."""
@@ -184,7 +185,7 @@ class GuardedGun:
             raise PluginError(f"gun plug-in {self.name} broke off in {what}: {said}") from error
 
     def _disarm_it(self) -> None:
-        self._ask("disarm", self._gun.disarm)
+        self._ask("disarm", self._gun.disarm, DISARM_S)
 
     def _check_disarmed(self, when: str) -> None:
         state = _checked_status(self.name, self._ask("status", self._gun.status), self._clock()).state
