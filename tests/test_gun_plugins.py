@@ -14,7 +14,7 @@ import pytest
 from device import GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
 from device.methods import paper_methods
 from device.plugin import door, guard
-from device.plugin.conformance import CHECKS, ConformanceRig, StillClock, broken, conformance, rig_at
+from device.plugin.conformance import GUN_CHECKS, ConformanceRig, StillClock, broken, conformance, rig_at
 from device.plugin.guard import GuardedGun, PluginError
 from device.simulated import SimulatedGun
 from experiments import run as runs
@@ -150,7 +150,7 @@ def test_a_plug_in_that_never_opens_is_refused(tmp_path, monkeypatch):
         monkeypatch, tmp_path, GUN.format(more="", made="__import__('time').sleep(9)"), name="slow", module="slow_gun"
     )
     monkeypatch.setattr(door, "try_import", lambda _: None)
-    monkeypatch.setattr(door, "OPEN_S", 0.05)
+    monkeypatch.setattr(door, "PLUGIN_OPEN_S", 0.05)
     with pytest.raises(PluginError, match=r"gun plug-in slow did not open '': TimeoutError: no answer within 0.05 s"):
         open_gun("slow")
 
@@ -332,7 +332,7 @@ def test_the_kit_finds_a_gun_that_lies_where_no_guard_stands(lie, check):
         open_gun=lambda: Liar(clock, **lie), clock=clock, wait=clock.wait, methods=paper_methods(), trials=2
     )
     assert [one.check for one in conformance(rig) if not one.kept and one.check == check] == [check]
-    assert set(CHECKS) >= {check}
+    assert set(GUN_CHECKS) >= {check}
 
 
 # a run

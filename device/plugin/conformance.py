@@ -22,14 +22,14 @@ from device.plugin.guard import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S
 from device.serial_gun.gun import speed_of
 from device.words import DIRECTIONS, DeviceError, Effect, Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport
 
-TRIALS = 20
+FEW_TRIALS = 20
 EVERY_S = 0.205
 """From shot to shot at least, so that 300 a minute are never reached."""
 SOON_S, AHEAD_S = 0.045, 1.5
 """So long ahead is every third shot of the trials asked for, and the one that is called off."""
 MAX_FAILED = 0.05
 """Of the trials: a gun may fail, and say so; one that fails more often is of no use. Assumed."""
-PATIENCE_S = 30.0
+RECOVERED_S = 30.0
 
 
 class RuleBroken(Exception):  # noqa: N818 - a finding
@@ -47,7 +47,7 @@ class ConformanceRig:
     clock: Callable[[], float]
     wait: Callable[[float], None]
     methods: Mapping[str, Method]
-    trials: int = TRIALS
+    trials: int = FEW_TRIALS
     speed: float = 1.0
     break_it: Callable[[], None] | None = None
 
@@ -84,7 +84,7 @@ class StillClock:
 def rig_at(
     address: str,
     methods: Mapping[str, Method] | None = None,
-    trials: int = TRIALS,
+    trials: int = FEW_TRIALS,
     break_it: Callable[[], None] | None = None,
     speed: float | None = None,
 ) -> ConformanceRig:
@@ -110,7 +110,7 @@ def rig_at(
 
 def conformance(rig: ConformanceRig) -> tuple[ConformanceFinding, ...]:
     """Every check on a gun that is opened anew for each, and closed; a check that is broken off is one not kept."""
-    return tuple(_found(name, check, rig) for name, check in CHECKS.items())
+    return tuple(_found(name, check, rig) for name, check in GUN_CHECKS.items())
 
 
 def broken(findings: Iterable[ConformanceFinding]) -> list[str]:
@@ -118,10 +118,10 @@ def broken(findings: Iterable[ConformanceFinding]) -> list[str]:
     return [f"{one.check}: {one.said}" for one in findings if not one.kept]
 
 
-Check = Callable[[ConformanceRig, Gun], str]
+KitCheck = Callable[[ConformanceRig, Gun], str]
 
 
-def _found(name: str, check: Check, rig: ConformanceRig) -> ConformanceFinding:
+def _found(name: str, check: KitCheck, rig: ConformanceRig) -> ConformanceFinding:
     try:
         gun = rig.open_gun()
         try:
@@ -201,13 +201,13 @@ def _trials(rig: ConformanceRig, gun: Gun) -> str:
 
 def _recovered(gun: Gun) -> GunStatus:
     """How a gun stands that failed in a trial: as a run does, it is disarmed and asked until it answers again."""
-    end_s = time.monotonic() + PATIENCE_S
+    end_s = time.monotonic() + RECOVERED_S
     while True:
         try:
             gun.disarm()
             return gun.status()
         except LinkError as error:
-            _expect(time.monotonic() < end_s, f"after a failure it does not answer for {PATIENCE_S:g} s: {error}")
+            _expect(time.monotonic() < end_s, f"after a failure it does not answer for {RECOVERED_S:g} s: {error}")
             time.sleep(0.1)
 
 
@@ -278,7 +278,7 @@ def _called_off(rig: ConformanceRig, gun: Gun, shot: Shot) -> bool:
     over = ended.wait(AHEAD_S / 3 / rig.speed)
     disarmed_s = rig.clock()
     gun.disarm()
-    _expect(ended.wait(PATIENCE_S) and bool(outcome), "a shot that waits neither ends nor is called off")
+    _expect(ended.wait(RECOVERED_S) and bool(outcome), "a shot that waits neither ends nor is called off")
     (end,) = outcome
     if isinstance(end, DeviceError):
         return True
@@ -294,13 +294,13 @@ def _faults(rig: ConformanceRig, gun: Gun) -> str:
     _ready(rig, gun)
     rig.break_it()
     try:
-        report = answer_within(PATIENCE_S, lambda: gun.fire(shot))
+        report = answer_within(RECOVERED_S, lambda: gun.fire(shot))
     except DeviceError as error:
         said = str(error)
     else:
         raise RuleBroken(f"broken, it reports a shot at {report.pulse_start_s:.6f} s")
     with suppress(DeviceError):
-        answer_within(PATIENCE_S, gun.disarm)
+        answer_within(RECOVERED_S, gun.disarm)
     return said
 
 
@@ -324,7 +324,7 @@ def _end(rig: ConformanceRig, gun: Gun) -> str:
     return "closed, it takes no command"
 
 
-CHECKS: Mapping[str, Check] = {
+GUN_CHECKS: Mapping[str, KitCheck] = {
     "birth": _birth,
     "limits": _limits,
     "trials": _trials,

@@ -27,9 +27,9 @@ OUR_OWN = ("simulated", "serial")
 """Names that no plug-in can have."""
 IMPORT_S = 20.0
 """So long the import of a plug-in may take; PsychoPy's takes less. Assumed."""
-OPEN_S = 10.0
+PLUGIN_OPEN_S = 10.0
 """So long it may take to find its device. Assumed."""
-COMMANDS: dict[str, int] = {"identify": 0, "arm": 0, "fire": 2, "disarm": 0, "status": 0, "close": 0}
+GUN_COMMANDS: dict[str, int] = {"identify": 0, "arm": 0, "fire": 2, "disarm": 0, "status": 0, "close": 0}
 """What a gun has, and how many parameters each is called with."""
 
 
@@ -41,9 +41,9 @@ def plugin_names() -> tuple[str, ...]:
 def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
     """The gun at `NAME:REST`, behind the guard. `ValueError`: no such plug-in; `PluginError`: refused, and why."""
     name, _, rest = address.partition(":")
-    make = _loaded(_entry(name))
+    make = _loaded(entry_of(name))
     try:
-        gun = answer_within(OPEN_S, lambda: make(rest, dict(methods), clock))
+        gun = answer_within(PLUGIN_OPEN_S, lambda: make(rest, dict(methods), clock))
     except LinkError as error:
         raise PluginError(f"{address}: {error}") from error
     except Exception as error:
@@ -54,7 +54,7 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:
     """Import a plug-in in a process of its own, which may hang or crash. `PluginError` says what it did."""
-    command = [sys.executable, "-P", "-m", "device.plugin.door", name]
+    command = [sys.executable, "-P", "-m", "device.plugin", name]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
     with tempfile.TemporaryFile() as errors:
         try:
@@ -79,7 +79,7 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
         raise PluginError(f"gun plug-in {name}: its import {ended}: {said.rpartition(chr(10))[2] or 'it said nothing'}")
 
 
-def _entry(name: str) -> EntryPoint:
+def entry_of(name: str) -> EntryPoint:
     """The one entry point of that name. `ValueError`: there is none; `PluginError`: two packages have it."""
     found = [point for point in entry_points(group=GROUP) if point.name == name and name not in OUR_OWN]
     if not found:
@@ -110,32 +110,15 @@ def _loaded(point: EntryPoint) -> Callable[..., object]:
 
 def _check_commands(name: str, gun: object) -> None:
     """`PluginError` names the commands that a gun lacks, or that do not take what a gun's take."""
-    lacking = [command for command in COMMANDS if not callable(getattr(gun, command, None))]
+    lacking = [command for command in GUN_COMMANDS if not callable(getattr(gun, command, None))]
     if lacking:
         raise PluginError(
-            f"gun plug-in {name}: {type(gun).__name__} has no {', '.join(lacking)}; a gun has {', '.join(COMMANDS)} "
-            "(device.Gun)"
+            f"gun plug-in {name}: {type(gun).__name__} has no {', '.join(lacking)}; "
+            f"a gun has {', '.join(GUN_COMMANDS)} (device.Gun)"
         )
-    for command, count in COMMANDS.items():
+    for command, count in GUN_COMMANDS.items():
         try:
             inspect.signature(getattr(gun, command)).bind(*[None] * count)
         except TypeError as error:
             wanted = f"{command}({'shot, at_s' if count else ''})"
             raise PluginError(f"gun plug-in {name}: it cannot be called as {wanted}: {error}") from error
-
-
-def main(name: str) -> int:
-    """Import one plug-in; what is wrong with it is the last line on stderr."""
-    try:
-        make = _entry(name).load()
-        if not callable(make):
-            raise TypeError(f"the entry point is {make!r}; it must be a function of (address, methods, clock)")
-        inspect.signature(make).bind("", {}, None)
-    except Exception as error:  # noqa: BLE001 - a plug-in may do anything
-        sys.stderr.write(f"\n{type(error).__name__}: {error}\n")
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
