@@ -338,6 +338,7 @@ def test_the_kit_finds_a_gun_that_lies_where_no_guard_stands(lie, check):
 # a run
 
 
+@pytest.mark.slow
 def test_a_run_is_carried_out_on_a_plug_in(tmp_path: Path, sound_card: str) -> None:
     """On a clock that goes fifty times faster: nobody is to wait for the breaks."""
     request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
