@@ -31,6 +31,7 @@ COMMANDS = (
     sessions.check,
     sessions.run,
     sessions.study,
+    sessions.watch,
     sessions.freeze,
     sessions.rebuild,
     numbers.analyze,

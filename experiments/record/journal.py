@@ -346,7 +346,7 @@ def contents_of(path: Path, data: bytes) -> Contents | None:
     if first is None:
         return None
     links = [*map(link_of, lines)]
-    others = (_record(path, number, line, links[number - 1]) for number, line in enumerate(lines[1:], start=1))
+    others = (record_of(path, number, line, links[number - 1]) for number, line in enumerate(lines[1:], start=1))
     return Contents(
         path=path,
         head=first,
@@ -389,7 +389,8 @@ def head_of(path: Path, data: bytes) -> Head | None:
     return read_as(_HEAD, value | of_head, f"{path}: line 1")
 
 
-def _record(path: Path, number: int, line: bytes, before: str) -> Record:
+def record_of(path: Path, number: int, line: bytes, before: str) -> Record:
+    """The record on a line after the first; it follows from the line before. `JournalError` if it does not."""
     return read_as(_RECORD, _values(path, number, line, before), f"{path}: line {number + 1}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -125,6 +126,21 @@ def study(
         say(f"recoil: {message}")
     show(feature.study_json(found), feature.study_text(found), as_json)
     raise end(exceptions=bool(found.overview.problems))
+
+
+def watch(
+    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A results folder, or a study's folder.")],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="A port of this machine; 0: any that is free.")] = 8477,
+    as_json: AsJsonOption = False,
+) -> None:
+    """A read-only page on this machine about runs in progress, until interrupted: prints its address."""
+    from experiments.watch import server as feature
+
+    def tell(page: feature.WatchPage) -> None:
+        show(page, f"{page.address}\nOpen it in a browser of this machine. Ctrl+C ends it.", as_json)
+        sys.stdout.flush()
+
+    feature.serve_page(results, port, tell)
 
 
 def freeze(

@@ -1,0 +1,189 @@
+"""A results folder while runs are going on: its journals are found and followed by one reader, for all who look."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from experiments.record.journal import ENDING
+from experiments.study.folders import PlaceError
+from experiments.watch.runs import RunRow, WatchedRun
+
+LOOK_S = 0.1
+"""How long after a look the next one comes."""
+HOLD_S, CHECK_S, TICK_S = 0.5, 5.0, 0.5
+"""How often it is asked who holds a journal, whether what was read still stands there, and how long still."""
+FIRST_S = 0.15
+"""So long at most the journals that are new are read in one look, so that those that grow do not wait for them."""
+SHARE = 4
+"""A look that takes long is followed by a rest so many times as long: a folder of thousands is looked at less often."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watched:
+    """What a look at the folder found: each run, by participant and experiment, and what there is to say beside them.
+
+    `set_aside` and `unread`: how many journals were set aside, which are not shown, and how many are still to be read.
+    """
+
+    folder: Path
+    utc: datetime
+    rows: tuple[RunRow, ...] = ()
+    set_aside: int = 0
+    unread: int = 0
+    problem: str = ""
+
+
+def watched_folder(folder: Path) -> Path:
+    """The results folder that is meant: a study's folder means its results. `PlaceError` if there is no such folder."""
+    if not folder.is_dir():
+        raise PlaceError(f"{folder}: no such folder; name a results folder, or the folder of a study")
+    return folder / "results" if (folder / "study.toml").is_file() else folder
+
+
+class FolderWatch:
+    """Looks at the journals of a folder, and remembers them. Nothing is written, and nothing is kept open."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._runs: dict[Path, WatchedRun] = {}
+        self._unread: dict[Path, float] = {}
+        self._set_aside, self._problem = 0, ""
+        self._asked_s = self._checked_s = self._told_s = -1e9
+
+    def look(self) -> Watched | None:
+        """What there is to show; `None` if that is the same as before."""
+        now_s = time.monotonic()
+        changed = self._find()
+        for run in tuple(self._runs.values()):
+            changed |= run.look()
+        changed |= self._read_unread(now_s + FIRST_S)
+        if now_s - self._asked_s >= HOLD_S or changed:
+            self._asked_s = now_s
+            for run in self._runs.values():
+                changed |= run.ask_who_holds()
+        if now_s - self._checked_s >= CHECK_S:
+            self._checked_s = now_s
+            for run in self._runs.values():
+                if not run.over:
+                    run.check()
+        if not changed and now_s - self._told_s < TICK_S:
+            return None
+        self._told_s = now_s
+        return self._watched()
+
+    def _watched(self) -> Watched:
+        utc = datetime.now(UTC)
+        return Watched(
+            folder=self.folder,
+            utc=utc,
+            rows=tuple(self._runs[path].row(utc) for path in sorted(self._runs)),
+            set_aside=self._set_aside,
+            unread=len(self._unread),
+            problem=self._problem,
+        )
+
+    def _find(self) -> bool:
+        """Know the journals that are there now; whether they are others than before."""
+        before = (self._set_aside, self._problem, len(self._runs) + len(self._unread))
+        found, self._set_aside, self._problem = dict[Path, float](), 0, ""
+        try:
+            for entry in journals_in(self.folder):
+                if entry.name.endswith(ENDING):
+                    found[Path(entry.path)] = entry.stat().st_mtime
+                else:
+                    self._set_aside += 1
+        except OSError as error:
+            self._problem = f"{error.filename or self.folder}: cannot be read ({error.strerror})"
+        if not self._problem:
+            self._runs = {path: run for path, run in self._runs.items() if path in found}
+            self._unread = {path: at_s for path, at_s in found.items() if path not in self._runs}
+        return before != (self._set_aside, self._problem, len(self._runs) + len(self._unread))
+
+    def _read_unread(self, until_s: float) -> bool:
+        """Read journals for the first time, the youngest first; whether there were any."""
+        waiting = sorted(self._unread, key=lambda path: -self._unread[path])
+        for path in waiting:
+            run = self._runs[path] = WatchedRun(path)
+            del self._unread[path]
+            run.look()
+            if time.monotonic() > until_s:
+                break
+        return bool(waiting)
+
+
+def journals_in(folder: Path) -> Iterator[os.DirEntry[str]]:
+    """The files that runs write their records to, those that were set aside too."""
+    with os.scandir(folder) as people:
+        for person in people:
+            if person.name.startswith("sub-") and person.is_dir():
+                with os.scandir(person) as files:
+                    yield from (one for one in files if _is_journal(one))
+
+
+_STEM = ENDING.removesuffix(".jsonl")
+
+
+def _is_journal(entry: os.DirEntry[str]) -> bool:
+    return _STEM in entry.name and entry.name.endswith(".jsonl") and entry.is_file()
+
+
+class Reader:
+    """The one thread that looks, and what it saw last, for everybody who waits for it.
+
+    `made`: what is kept of a look, made once however many wait.
+    """
+
+    def __init__(self, watch: FolderWatch, made: Callable[[Watched], tuple[str, ...]]) -> None:
+        self._watch, self._made = watch, made
+        self._news = threading.Condition()
+        self._parts: tuple[str, ...] = ()
+        self._number = 0
+        self._leaves = threading.Event()
+        self._thread = threading.Thread(target=self._look_on, daemon=True, name="watch")
+
+    def start(self) -> None:
+        """Look once, and go on beside."""
+        self._look()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._leaves.set()
+        self._thread.join()
+        with self._news:
+            self._news.notify_all()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether there will be nothing new."""
+        return self._leaves.is_set()
+
+    def after(self, number: int, wait_s: float) -> tuple[int, tuple[str, ...]]:
+        """What was seen last and its number, as soon as that is another than one has, or after so long."""
+        with self._news:
+            self._news.wait_for(lambda: self._number != number or self.stopped, wait_s)
+            return self._number, self._parts
+
+    def _look_on(self) -> None:
+        began_s = time.monotonic()
+        took_s = 0.0
+        while not self._leaves.wait(max(LOOK_S, SHARE * took_s)):
+            began_s = time.monotonic()
+            self._look()
+            took_s = time.monotonic() - began_s
+
+    def _look(self) -> None:
+        seen = self._watch.look()
+        if seen is None:
+            return
+        parts = self._made(seen)
+        if parts != self._parts:
+            with self._news:
+                self._parts, self._number = parts, self._number + 1
+                self._news.notify_all()
