@@ -77,12 +77,17 @@ class FolderWatch:
         self._told_s = now_s
         return self._watched()
 
+    @property
+    def runs(self) -> tuple[WatchedRun, ...]:
+        """What is watched, in order of the files' names."""
+        return tuple(self._runs[path] for path in sorted(self._runs))
+
     def _watched(self) -> Watched:
         utc = datetime.now(UTC)
         return Watched(
             folder=self.folder,
             utc=utc,
-            rows=tuple(self._runs[path].row(utc) for path in sorted(self._runs)),
+            rows=tuple(run.row(utc) for run in self.runs),
             set_aside=self._set_aside,
             unread=len(self._unread),
             problem=self._problem,
@@ -153,9 +158,10 @@ class Reader:
         self._thread.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Look no more, and let go of everybody who waits."""
         self._leaves.set()
-        self._thread.join()
+        if self._thread.ident is not None:
+            self._thread.join()
         with self._news:
             self._news.notify_all()
 

@@ -1,0 +1,437 @@
+"""The page about runs in progress: what it shows of each, whom it refuses, and that it touches nothing."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import re
+import shutil
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from device.words import RecoilError
+from experiments.record import storage
+from experiments.record.journal import JournalError
+from experiments.record.tail import JournalTail
+from experiments.watch import server as serving
+from experiments.watch.folder import FolderWatch, Reader, watched_folder
+from experiments.watch.page import PARTS, page_parts
+from experiments.watch.runs import RunRow
+from experiments.watch.server import WatchServer
+from tests.conftest import Recoil, refused
+from tests.journals import forged
+from tests.waiting import PATIENCE_S, wait_for
+
+NAME = "sub-P01_task-direction_journal.jsonl"
+
+
+@pytest.fixture(scope="module")
+def whole(reproduction: Path) -> bytes:
+    """The journal of a finished run."""
+    return (reproduction / "logs" / "sub-P01" / NAME).read_bytes()
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Path:
+    folder = tmp_path / "results" / "sub-P01"
+    folder.mkdir(parents=True)
+    return folder / NAME
+
+
+def results_of(journal: Path) -> Path:
+    return journal.parent.parent
+
+
+def lines_of(whole: bytes) -> list[bytes]:
+    return whole.splitlines(keepends=True)
+
+
+def rows(watch: FolderWatch) -> tuple[RunRow, ...]:
+    seen = watch.look()
+    assert seen is not None
+    return seen.rows
+
+
+def row(journal: Path) -> RunRow:
+    (found,) = rows(FolderWatch(results_of(journal)))
+    return found
+
+
+def part(whole: bytes, kind: str, number: int = 1) -> bytes:
+    """A journal up to the record of the n-th step of a kind, which stands last."""
+    lines, count = lines_of(whole), 0
+    for end, line in enumerate(lines, start=1):
+        record = json.loads(line)
+        count += record["kind"] == "step" and record["body"]["kind"] == kind
+        if count == number:
+            return b"".join(lines[:end])
+    raise AssertionError(kind)
+
+
+@contextmanager
+def held(journal: Path) -> Iterator[None]:
+    """A journal that a run has open, as the page sees it from another process."""
+    descriptor = storage.reopen(journal)
+    assert storage.hold(descriptor)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def with_remarks(whole: bytes, *bodies: dict[str, object]) -> bytes:
+    """A journal that goes on with remarks."""
+    entries = [json.loads(line) for line in lines_of(whole)]
+    entries += [entries[-1] | {"kind": "remark", "body": body} for body in bodies]
+    return forged(entries)
+
+
+# what is shown of a run
+
+
+def test_a_run_is_shown_with_its_place_and_what_is_awaited_and_without_any_answer(journal: Path, whole: bytes) -> None:
+    journal.write_bytes(part(whole, "ask", 8))
+    with held(journal):
+        shown = row(journal)
+    assert (shown.state, shown.done, shown.planned) == ("running", 7, 60)
+    assert shown.where == "Trial 8 of 20 · set 2 of 4 · session 1 of 3"
+    assert shown.doing == "an answer is awaited"
+    seen = FolderWatch(results_of(journal)).look()
+    assert seen is not None
+    page = " ".join(page_parts(seen))
+    assert "SYNTHETIC" in page
+    for word in ("forward", "backward", "correct", "asymmetric", "vibration"):
+        assert word not in page
+
+
+@pytest.mark.parametrize(
+    ("remarks", "state", "faults"),
+    [
+        ([{"kind": "paused"}], "paused", 0),
+        ([{"kind": "paused", "cause": "the keys are gone"}], "paused", 1),
+        ([{"kind": "paused"}, {"kind": "continued", "paused_s": 3.0}], "running", 0),
+        ([{"kind": "halted", "by": "participant"}], "emergency stop", 1),
+    ],
+)
+def test_a_pause_and_an_emergency_stop_are_told(
+    remarks: list[dict[str, object]], state: str, faults: int, journal: Path, whole: bytes
+) -> None:
+    journal.write_bytes(with_remarks(part(whole, "prepare", 3), *remarks))
+    with held(journal):
+        shown = row(journal)
+    assert (shown.state, shown.faults, shown.problem) == (state, faults, "")
+
+
+def test_ends_are_told_apart(journal: Path, whole: bytes) -> None:
+    journal.write_bytes(b"")
+    assert row(journal).state == "not begun"
+    with held(journal):
+        assert row(journal).state == "beginning"
+    journal.write_bytes(whole)
+    assert (row(journal).state, row(journal).done) == ("finished", 60)
+    cut = part(whole, "ask", 5)
+    entries = [json.loads(line) for line in lines_of(cut)]
+    journal.write_bytes(forged([*entries, entries[-1] | {"kind": "stopped", "reason": "lunch"}]))
+    assert (row(journal).state, row(journal).doing) == ("stopped", "lunch")
+    journal.write_bytes(cut + b'{"n":')
+    assert row(journal).state == "broken off"
+    assert "cut off after 5 bytes" in row(journal).problem
+    with held(journal):
+        assert (row(journal).state, row(journal).problem) == ("running", "")
+
+
+def test_a_run_that_was_killed_and_resumed_says_so(journal: Path, whole: bytes) -> None:
+    entries = [json.loads(line) for line in lines_of(part(whole, "ask", 5))]
+    journal.write_bytes(forged([*entries, entries[0] | {"kind": "resumed", "synced_s": None}]))
+    with held(journal):
+        shown = row(journal)
+    assert (shown.faults, shown.sync) == (1, None)
+    assert shown.last_fault is not None
+    assert "broken off" in shown.last_fault.what
+
+
+def test_how_long_still_counts_from_the_plan_and_stops_in_a_pause(journal: Path, whole: bytes) -> None:
+    def real(data: bytes) -> bytes:
+        return forged([entry | {"clock": "real"} for entry in map(json.loads, lines_of(data))])
+
+    def left_s(data: bytes) -> float:
+        journal.write_bytes(data)
+        with held(journal):
+            found = row(journal).left_s
+        assert found is not None
+        return found
+
+    early, late = (left_s(real(part(whole, "prepare", number))) for number in (2, 50))
+    assert early > late > 0
+    resting = [entry | {"utc": "2026-01-01T00:00:00Z"} for entry in raw_of(part(whole, "rest"))]
+    journal.write_bytes(forged([entry | {"clock": "real"} for entry in resting]))
+    watch = FolderWatch(results_of(journal))
+    with held(journal):
+        assert rows(watch)[0].doing == "a break"
+    run = watch.runs[0]
+    at = datetime(2026, 1, 1, tzinfo=UTC)
+    long = resting[-1]["body"]["duration_s"]
+    begun, ended, later = (run.row(at + timedelta(seconds=after)).left_s for after in (0.0, long, 10 * long))
+    assert begun is not None
+    assert ended == later == pytest.approx(begun - long)
+
+
+def raw_of(data: bytes) -> list[dict[str, object]]:
+    return [json.loads(line) for line in lines_of(data)]
+
+
+def test_a_copied_folder_is_shown_like_any_other(journal: Path, whole: bytes, tmp_path: Path) -> None:
+    journal.write_bytes(part(whole, "ask", 5))
+    shutil.copytree(results_of(journal), tmp_path / "copy")
+    with held(journal):
+        (shown,) = rows(FolderWatch(tmp_path / "copy"))
+        assert replace(shown, state="running") == replace(row(journal), left_s=None)
+    assert shown.state == "broken off"
+
+
+# a journal that grows
+
+
+def test_records_are_read_once_each_as_they_come(journal: Path, whole: bytes) -> None:
+    lines, tail, found = lines_of(whole)[:40], JournalTail(journal), []
+    journal.write_bytes(b"")
+    assert tail.look().records == ()
+    for line in lines:
+        half = len(line) // 2
+        for piece in (line[:half], line[half:]):
+            with journal.open("ab") as file:
+                file.write(piece)
+            found += [record.n for record in tail.look().records]
+    assert found == list(range(40))
+
+
+def test_a_journal_that_is_set_aside_gives_way_to_the_new_one(journal: Path, whole: bytes) -> None:
+    journal.write_bytes(part(whole, "ask", 5))
+    watch = FolderWatch(results_of(journal))
+    assert [one.done for one in rows(watch)] == [4]
+    journal.rename(journal.with_name("sub-P01_task-direction_journal.aside-1.jsonl"))
+    journal.write_bytes(part(whole, "ask", 2))
+    seen = watch.look()
+    assert seen is not None
+    assert ([one.done for one in seen.rows], seen.set_aside) == ([1], 1)
+
+
+def damaged(data: bytes, at: int) -> bytes:
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+
+
+def test_damage_while_it_is_watched_is_said_in_its_row_and_gone_with_it(journal: Path, whole: bytes) -> None:
+    good = part(whole, "ask", 8)
+    journal.write_bytes(good)
+    watch = FolderWatch(results_of(journal))
+    assert rows(watch)[0].state == "broken off"
+    lines = lines_of(good)
+    for broken, said in (
+        (damaged(good, len(good) // 2), f"{journal}: line "),
+        (b"".join(lines[:20]), f"has 20 whole records and had {len(lines)} while it was watched"),
+        (forged([*raw_of(good)[:-1], raw_of(good)[-1] | {"monotonic_s": 0.5}]), "was rewritten while it was watched"),
+        (b"\xff\x00" * 50 + b"\n", "line 1: "),
+    ):
+        journal.write_bytes(broken)
+        os.utime(journal, ns=(0, len(broken)))  # another time, however coarse the disk's
+        (shown,) = rows(watch)
+        assert (shown.state, said in shown.problem) == ("damaged", True), shown
+        journal.write_bytes(good)
+        os.utime(journal, ns=(0, 1))
+        assert rows(watch)[0].state == "broken off"
+
+
+def test_damage_that_leaves_size_and_time_is_found_by_the_check(journal: Path, whole: bytes) -> None:
+    good = part(whole, "ask", 3)
+    journal.write_bytes(good)
+    os.utime(journal, ns=(0, 7))
+    tail = JournalTail(journal)
+    assert tail.look().records
+    journal.write_bytes(damaged(good, len(good) // 2))
+    os.utime(journal, ns=(0, 7))
+    assert tail.look().records == ()
+    tail.check()
+    with pytest.raises(JournalError, match="line"):
+        tail.look()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"body": {"kind": "ask"}},
+        {"body": 7},
+        {"utc": "yesterday"},
+        {"monotonic_s": 1e308},
+        {"kind": "outcome", "body": {"kind": "closed"}},
+        {"kind": "remark", "body": {"kind": "halted", "by": "nobody"}},
+    ],
+)
+def test_a_forged_record_is_no_end_of_the_page(change: dict[str, object], journal: Path, whole: bytes) -> None:
+    entries = raw_of(part(whole, "ask", 5))
+    journal.write_bytes(forged([*entries[:-1], entries[-1] | change | {"clock": "real"}]))
+    with held(journal):
+        seen = FolderWatch(results_of(journal)).look()
+    assert seen is not None
+    assert "<article" in page_parts(seen)[1]
+
+
+def test_a_journal_under_another_name_and_what_is_no_journal_are_said(journal: Path, whole: bytes) -> None:
+    journal.with_name("sub-P09_task-direction_journal.jsonl").write_bytes(whole)
+    journal.write_bytes(b"no journal <script>\n")
+    os.mkfifo(journal.with_name("sub-P02_task-direction_journal.jsonl"))  # nothing is ever read from it
+    seen = FolderWatch(results_of(journal)).look()
+    assert seen is not None
+    assert [one.state for one in seen.rows] == ["damaged", "damaged"]
+    assert "was it renamed?" in seen.rows[1].problem
+    assert "<script>" not in page_parts(seen)[1]
+
+
+def test_a_folder_that_goes_away_is_said_and_comes_back(journal: Path, whole: bytes) -> None:
+    journal.write_bytes(whole)
+    watch = FolderWatch(results_of(journal))
+    assert len(rows(watch)) == 1
+    away = results_of(journal).rename(results_of(journal).with_name("away"))
+    seen = watch.look()
+    assert seen is not None
+    assert "cannot be read" in seen.problem
+    away.rename(results_of(journal))
+    seen = watch.look()
+    assert seen is not None
+    assert (seen.problem, len(seen.rows)) == ("", 1)
+
+
+def test_nothing_in_the_folder_is_touched_and_a_run_finds_its_journal_free(journal: Path, whole: bytes) -> None:
+    journal.write_bytes(part(whole, "ask", 5))
+    before = [(path, path.stat().st_mtime_ns, path.stat().st_ctime_ns) for path in results_of(journal).rglob("*")]
+    watch = FolderWatch(results_of(journal))
+    for _ in range(20):
+        watch.look()
+        with held(journal):
+            watch.look()
+    assert before == [
+        (path, path.stat().st_mtime_ns, path.stat().st_ctime_ns) for path in results_of(journal).rglob("*")
+    ]
+
+
+def test_a_study_means_its_results_and_no_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").touch()
+    assert watched_folder(tmp_path) == tmp_path / "results"
+    with pytest.raises(RecoilError, match="no such folder"):
+        watched_folder(tmp_path / "nowhere")
+
+
+# the page
+
+
+@pytest.fixture
+def server(journal: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[WatchServer]:
+    monkeypatch.setattr(serving, "REFUSAL_S", 0.01)
+    reader = Reader(FolderWatch(results_of(journal)), page_parts)
+    with WatchServer(reader, 0, "results") as running:
+        reader.start()
+        thread = threading.Thread(target=running.serve_forever, args=(0.01,))
+        thread.start()
+        yield running
+        reader.stop()
+        running.shutdown()
+        thread.join()
+
+
+def asked(server: WatchServer, path: str, method: str = "GET", **headers: str) -> tuple[int, str, dict[str, str]]:
+    connection = http.client.HTTPConnection(serving.HOST, server.page.port, timeout=PATIENCE_S)
+    connection.request(method, path, headers=headers)
+    answer = connection.getresponse()
+    body = answer.read().decode()
+    connection.close()
+    return answer.status, body, dict(answer.getheaders())
+
+
+def test_the_page_is_whole_without_a_script_and_holds_nothing_from_elsewhere(server: WatchServer) -> None:
+    status, body, headers = asked(server, f"/{server.token}/")
+    assert status == 200
+    assert "no run has begun here" in body
+    assert 'http-equiv="refresh"' in body
+    assert not re.search(r"(src|href)=\"(https?:)?//", body)
+    assert headers["Content-Security-Policy"].startswith("default-src 'none'")
+    assert not [name for name in headers if name.startswith("Access-Control")]
+    for name in re.findall(r'(?:src|href)="(watch\.\w+)"', body):
+        assert asked(server, f"/{server.token}/{name}")[0] == 200
+    status, body, headers = asked(server, f"/{server.token}/", "HEAD")
+    assert (status, body) == (200, "")
+    assert int(headers["Content-Length"]) > 500
+    assert asked(server, f"/{server.token}")[2]["Location"] == f"/{server.token}/"
+
+
+def test_who_is_not_meant_is_refused(server: WatchServer) -> None:
+    there = f"/{server.token}/"
+    assert asked(server, "/")[0] == 403
+    assert asked(server, f"/{server.token[:-1]}x/")[0] == 403
+    assert asked(server, f"/x{there}")[0] == 403
+    assert asked(server, there + "../../etc/passwd")[0] == 404
+    assert asked(server, there, Host=f"rebound.example:{server.page.port}")[0] == 403
+    assert asked(server, there, Host="localhost:9000")[0] == 200  # by a tunnel
+    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
+        assert asked(server, there, method)[0] == 405
+
+
+def test_of_many_wrong_tokens_at_a_time_some_get_no_answer(
+    server: WatchServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for _ in range(serving.REFUSED_AT_ONCE):
+        server.refusals.acquire()
+    with pytest.raises(http.client.RemoteDisconnected):
+        asked(server, "/guess/")
+    assert asked(server, f"/{server.token}/")[0] == 200
+
+
+def test_a_viewer_gets_what_is_new_without_asking_again(server: WatchServer, journal: Path, whole: bytes) -> None:
+    connection = http.client.HTTPConnection(serving.HOST, server.page.port, timeout=PATIENCE_S)
+    connection.request("GET", f"/{server.token}/events")
+    stream, seen = connection.getresponse(), dict.fromkeys(PARTS, "")
+
+    def read() -> str:
+        line = stream.readline().decode()
+        if line.startswith("event: "):
+            seen[line.split()[1]] = stream.readline().decode()
+        return seen["open"]
+
+    wait_for(lambda: "No run is open" in read())
+    journal.write_bytes(part(whole, "ask", 2))
+    wait_for(lambda: "1 of 60 trials done" in read())
+    with journal.open("ab") as file:
+        file.write(part(whole, "ask", 4)[journal.stat().st_size :])
+    wait_for(lambda: "3 of 60 trials done" in read())
+    connection.close()
+
+
+def test_viewers_who_are_one_too_many_are_turned_away(journal: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "VIEWERS", 1)
+    reader = Reader(FolderWatch(results_of(journal)), page_parts)
+    with WatchServer(reader, 0, "results") as running:
+        thread = threading.Thread(target=running.serve_forever, args=(0.01,))
+        thread.start()
+        first = http.client.HTTPConnection(serving.HOST, running.page.port, timeout=PATIENCE_S)
+        first.request("GET", f"/{running.token}/events")
+        first.getresponse().readline()
+        with pytest.raises((http.client.RemoteDisconnected, ConnectionResetError)):
+            asked(running, f"/{running.token}/")
+        reader.stop()
+        running.shutdown()
+        thread.join()
+        first.close()
+
+
+# the command
+
+
+def test_a_port_that_is_taken_is_refused_in_one_message(server: WatchServer, journal: Path, recoil: Recoil) -> None:
+    done = recoil("watch", results_of(journal), "--port", server.page.port)
+    refused(done, f"--port {server.page.port}: cannot be used", "perhaps another `recoil watch` is there")
+    refused(recoil("watch", "nowhere"), "nowhere: no such folder")
