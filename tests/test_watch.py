@@ -22,7 +22,7 @@ from experiments.record.journal import JournalError
 from experiments.record.tail import JournalTail
 from experiments.watch import server as serving
 from experiments.watch.folder import FolderWatch, Reader, watched_folder
-from experiments.watch.page import PARTS, page_parts
+from experiments.watch.page import PAGE_PARTS, page_parts
 from experiments.watch.runs import RunRow
 from experiments.watch.server import WatchServer
 from tests.conftest import Recoil, refused
@@ -242,7 +242,7 @@ def test_damage_while_it_is_watched_is_said_in_its_row_and_gone_with_it(journal:
         journal.write_bytes(broken)
         os.utime(journal, ns=(0, len(broken)))  # another time, however coarse the disk's
         (shown,) = rows(watch)
-        assert (shown.state, said in shown.problem) == ("damaged", True), shown
+        assert (shown.name, shown.state, said in shown.problem) == ("P01", "damaged", True), shown
         journal.write_bytes(good)
         os.utime(journal, ns=(0, 1))
         assert rows(watch)[0].state == "broken off"
@@ -394,7 +394,7 @@ def test_of_many_wrong_tokens_at_a_time_some_get_no_answer(
 def test_a_viewer_gets_what_is_new_without_asking_again(server: WatchServer, journal: Path, whole: bytes) -> None:
     connection = http.client.HTTPConnection(serving.HOST, server.page.port, timeout=PATIENCE_S)
     connection.request("GET", f"/{server.token}/events")
-    stream, seen = connection.getresponse(), dict.fromkeys(PARTS, "")
+    stream, seen = connection.getresponse(), dict.fromkeys(PAGE_PARTS, "")
 
     def read() -> str:
         line = stream.readline().decode()

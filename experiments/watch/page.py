@@ -13,7 +13,7 @@ from experiments.session.duration import end_text
 from experiments.watch.folder import Watched
 from experiments.watch.runs import RunRow, SyncTimes, WatchedState, age_s
 
-PARTS = ("summary", "open", "finished")
+PAGE_PARTS = ("summary", "open", "finished")
 """The parts of the page that change, by their ids."""
 
 _SIGNS: dict[WatchedState, str] = {
@@ -42,7 +42,7 @@ _MOOD: dict[WatchedState, str] = {"running": "good", "finished": "good", "paused
 def whole_page(parts: tuple[str, ...], folder: str) -> bytes:
     """The page with its parts, as it is before anything changes."""
     template = Template(static("page.html").decode())
-    return template.substitute(dict(zip(PARTS, parts, strict=True)), folder=escape(folder)).encode()
+    return template.substitute(dict(zip(PAGE_PARTS, parts, strict=True)), folder=escape(folder)).encode()
 
 
 def static(name: str) -> bytes:

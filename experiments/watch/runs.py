@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from experiments.design.plan import Trial
-from experiments.rebuild import began_with, misnamed
+from experiments.rebuild import JOURNAL_NAME, began_with, misnamed
 from experiments.record import replay, storage
 from experiments.record.journal import Contents, Head, JournalError, Record, read_as
 from experiments.record.tables import DataKind
@@ -103,7 +103,7 @@ DOING: dict[State, str] = {
     State.INFORMING: "the participant is told something",
     State.RESTING: "a break",
     State.CLOSING: "everything is answered; the run can be ended",
-    State.PAUSED: "paused",
+    State.PAUSED: "",
     State.CORRECTING: "a correction",
     State.HALTED: "nothing fires until the run is closed and resumed",
     State.STOPPED: "",
@@ -271,6 +271,12 @@ def fault_text(word: object) -> str:
             return ""
 
 
+def _named(path: Path) -> tuple[str, str, bool]:
+    """Code, experiment and whether it is a practice, by a journal's name; the name itself, where it is none."""
+    name = JOURNAL_NAME.fullmatch(path.name)
+    return (name[1], name[2], name[3] is not None) if name else (path.name, "", False)
+
+
 class WatchedRun:
     """A journal in the folder that is watched, and what is to be shown of its run. Never raises."""
 
@@ -345,7 +351,9 @@ class WatchedRun:
         if self._finished is not None:
             return replace(self._finished, state=state, problem=self._said(state))
         if run is None:
-            return RunRow(name=self.path.name, state=state, problem=self._said(state))
+            name, experiment, practice = _named(self.path)
+            said = self._said(state)
+            return RunRow(name=name, state=state, experiment=experiment, practice=practice, problem=said)
         real = (run.head.clock or "real") == "real"
         return RunRow(
             name=run.plan.participant_id,
@@ -353,7 +361,7 @@ class WatchedRun:
             experiment=run.plan.experiment,
             practice=run.plan.practice,
             data=data_of(run.head),
-            doing=run.reason if run.end else DOING[run.state],
+            doing=run.reason if run.end else "" if state == "broken off" else DOING[run.state],
             where=run.where,
             done=run.done,
             planned=len(run.plan.trials),

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from experiments.study.folders import PlaceError
 from experiments.watch.folder import FolderWatch, Reader, watched_folder
-from experiments.watch.page import PARTS, page_parts, static, whole_page
+from experiments.watch.page import PAGE_PARTS, page_parts, static, whole_page
 
 HOST = "127.0.0.1"
 REFUSAL_S = 0.25
@@ -27,7 +27,7 @@ REFUSED_AT_ONCE = 8
 """Of so many wrong tokens at a time each gets its answer; of more none does."""
 VIEWERS = 64
 """Connections at a time; of further ones none is served."""
-PATIENCE_S = 10.0
+ASK_S = 10.0
 """How long somebody may take to ask, or to read what they asked for."""
 ALIVE_S = 1.0
 """How often a viewer to whom nothing is new is told that the page is alive."""
@@ -103,7 +103,7 @@ class _Handler(BaseHTTPRequestHandler):
     """One request. The library closes the connection after it."""
 
     server: WatchServer
-    timeout = PATIENCE_S
+    timeout = ASK_S
 
     def do_GET(self) -> None:
         path = self._allowed()
@@ -164,11 +164,11 @@ class _Handler(BaseHTTPRequestHandler):
         self._head(200, "text/event-stream")
         if self.command == "HEAD":
             return
-        number, sent = -1, ("",) * len(PARTS)
+        number, sent = -1, ("",) * len(PAGE_PARTS)
         self.wfile.write(b"retry: 1000\n\n")
         while not self.server.reader.stopped:
             number, parts = self.server.reader.after(number, ALIVE_S)
-            news = [(name, part) for name, part, old in zip(PARTS, parts, sent, strict=True) if part != old]
+            news = [(name, part) for name, part, old in zip(PAGE_PARTS, parts, sent, strict=True) if part != old]
             text = "".join(f"event: {name}\ndata: {part}\n\n" for name, part in news)
             self.wfile.write(text.encode() or b": alive\n\n")
             sent = parts
