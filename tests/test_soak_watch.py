@@ -28,8 +28,8 @@ from tests.waiting import wait_for
 
 pytestmark = pytest.mark.soak
 
-STEPS, UPDATE_S = 100, 0.5
-VIEWERS, RUNS, BLOCK = 20, 2, 5
+STEPS, UPDATE_S = 400, 0.5
+VIEWERS, RUNS, BLOCK = 20, 20, 5
 """Trials are watched and not watched in turn, so many at a time."""
 TRIALS = 60
 COST_MS = 1.0
