@@ -14,7 +14,7 @@ from experiments.record.journal import ENDING
 from experiments.study.folders import PlaceError
 from experiments.watch.runs import RunRow, WatchedRun
 
-EVERY_S = 0.1
+NEXT_LOOK_S = 0.1
 """How long after a look the next one comes."""
 HOLD_S, CHECK_S, TICK_S = 0.5, 5.0, 0.5
 """How often it is asked who holds a journal, whether what was read still stands there, and how long still."""
@@ -179,7 +179,7 @@ class Reader:
     def _look_on(self) -> None:
         began_s = time.monotonic()
         took_s = 0.0
-        while not self._leaves.wait(max(EVERY_S, SHARE * took_s)):
+        while not self._leaves.wait(max(NEXT_LOOK_S, SHARE * took_s)):
             began_s = time.monotonic()
             self._look()
             took_s = time.monotonic() - began_s
