@@ -29,10 +29,19 @@ SimulatedOption = Annotated[
 ]
 NullOption = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
 SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
+ConfigUnlessMergedArgument = Annotated[
+    str | None, typer.Argument(help="File or name of a shipped config; with --merge that of the shards unless given.")
+]
+ShardOption = Annotated[
+    str | None, typer.Option(metavar="K/N", help="Do the K-th of N parts alone, as a file in --out for --merge.")
+]
+MergeOption = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Put the shards in this folder together instead of simulating.")
+]
 
 
 def power(
-    config: terminal.ConfigArgument,
+    config: ConfigUnlessMergedArgument = None,
     *,
     participants: ParticipantsOption = None,
     trials: TrialsListOption = None,
@@ -45,6 +54,8 @@ def power(
     paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
     workers: terminal.WorkersOption = None,
     scheduler: SchedulerOption = None,
+    shard: ShardOption = None,
+    merge: MergeOption = None,
     out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
     as_json: terminal.AsJsonOption = False,
 ) -> None:
@@ -54,16 +65,21 @@ def power(
     """
     from analysis.predict.power import run as feature
     from analysis.predict.threshold_plan.run import procedures_of
+    from experiments.config.door import ConfigError
 
-    if procedures_of(config):
+    if shard is not None and merge is not None:
+        raise ConfigError(f"--shard {shard} --merge {merge}: first each job with --shard, then, once, --merge alone")
+    if config is None and merge is None:
+        raise ConfigError("CONFIG is missing: name a file or a shipped config, as in `recoil power direction`")
+    if config is not None and procedures_of(config):
         others = {"--participants": participants, "--methods": methods, "--effect": effect, "--null": null}
-        elsewhere = {"--scheduler": scheduler, "--workers": workers}
+        elsewhere = {"--scheduler": scheduler, "--workers": workers, "--shard": shard, "--merge": merge}
         _of_threshold(
             config, trials, studies, seed, out, as_json, [name for name, one in {**others, **elsewhere}.items() if one]
         )
         return
     request = feature.PowerRequest(
-        config=config,
+        config=config or "",
         participants=participants,
         trials=trials,
         methods=tuple(methods or ()),
@@ -74,7 +90,16 @@ def power(
         seed=seed,
         paper=paper,
     )
-    found = feature.power(request, out, terminal.progress, workers, scheduler)
+    if shard is not None:
+        done = feature.power_shard(
+            request, feature.part_of(shard), out, terminal.progress, workers=workers, scheduler=scheduler
+        )
+        terminal.show(done, feature.shard_in_short(done, out), as_json)
+        return
+    if merge is None:
+        found = feature.power(request, out, terminal.progress, workers, scheduler)
+    else:
+        found = feature.merged_power(merge, request, out)
     terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 

@@ -338,6 +338,11 @@ class Chunk:
     studies: int
     felt: Felt | None = None
 
+    @property
+    def people(self) -> int:
+        """How many people it draws."""
+        return self.studies * self.design.participants
+
 
 def run_chunk(chunk: Chunk) -> Tally:
     """Draw and analyse a chunk's studies."""

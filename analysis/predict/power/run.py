@@ -5,24 +5,29 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
+
+from pydantic import TypeAdapter
 
 from analysis.predict.jobs import RunPieces, cores, on_cluster, on_processes
 from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, run_chunk
 from analysis.predict.power.page import grid_assumptions, in_short, sections
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
+from analysis.predict.power.shards import Job, Part, Shard, part_of, read_shard, shards_in, tallies_of, write_shard
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
+from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["PowerRequest", "in_short", "power"]
+__all__ = ["PowerRequest", "in_short", "merged_power", "part_of", "power", "power_shard", "shard_in_short"]
 
 
 def power(
@@ -37,15 +42,85 @@ def power(
     grid = make_grid(request)
     chunks = grid.chunks()
     kept = out / f"unfinished-{job_of(grid)[:12]}.jsonl"
-    processes = on_processes(workers or cores()) if scheduler is None else on_cluster(scheduler)
-    with processes as run, progress("power", len(chunks)) as tell:
-        storage.make_folder(out)
-        tallies = _tallies(chunks, run, kept, tell)
-    found = power_of(grid, iter(tallies), grid_assumptions(grid))
+    with _processes(workers, scheduler) as run:
+        tallies = _tallies(chunks, range(len(chunks)), run, kept, progress)
+    found = _written(grid, tallies, out)
+    kept.unlink(missing_ok=True)
+    return found
+
+
+def power_shard(
+    request: PowerRequest,
+    part: Part,
+    out: Path,
+    progress: Progress,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Shard:
+    """One part of what `power` simulates, as a file in `out`; one that is there already is not worked out again."""
+    grid = make_grid(request)
+    chunks, job = grid.chunks(), _job(grid)
+    with contextlib.suppress(ConfigError):
+        there = read_shard(out / part.file_name)
+        if there.part == part and not there.job.unlike(job):
+            return there
+    kept = out / f"unfinished-{job.sha256[:12]}-{part.number}-of-{part.of}.jsonl"
+    with _processes(workers, scheduler) as run:
+        tallies = _tallies(chunks, part.pieces(chunks), run, kept, progress)
+    shard = Shard(part=part, job=job, tallies=tallies)
+    write_shard(out, shard)
+    kept.unlink(missing_ok=True)
+    return shard
+
+
+def merged_power(folder: Path, request: PowerRequest, out: Path) -> Power:
+    """What all shards in a folder come to, written into `out` as `power` would have written it.
+
+    A request without a config means that of the shards; any other must be theirs. `ConfigError` names each shard that
+    is not whole, of another job, doubled or missing.
+    """
+    shards = shards_in(folder)
+    grid = make_grid(request) if request.config else _grid_of(*next(iter(shards.items())), request)
+    tallies = tallies_of(folder, shards, _job(grid))
+    storage.make_folder(out)
+    return _written(grid, tallies, out)
+
+
+def _grid_of(path: Path, shard: Shard, request: PowerRequest) -> Grid:
+    theirs = shard.job.request
+    if request != PowerRequest(config=""):
+        raise ConfigError(
+            "--merge without CONFIG takes the options of the shards: leave others out, or name CONFIG too"
+        )
+    try:
+        return make_grid(theirs)
+    except ConfigError as error:
+        raise ConfigError(
+            f"{error}\n{path}: was run with config {theirs.config} and paper {theirs.paper}; merge in the folder where "
+            "the jobs were started, or give CONFIG and the options of the jobs"
+        ) from error
+
+
+def shard_in_short(shard: Shard, out: Path) -> str:
+    """What is told of a shard that is done."""
+    pieces = (
+        f"{len(shard.tallies)} pieces of work" if shard.tallies else "no work is left for it: fewer shards would do"
+    )
+    file = out / shard.part.file_name
+    return f"Shard {shard.part}: {pieces}\nFile: {file}; when all are there: recoil power --merge {out}"
+
+
+def _processes(workers: int | None, scheduler: str | None) -> AbstractContextManager[RunPieces]:
+    return on_processes(workers or cores()) if scheduler is None else on_cluster(scheduler)
+
+
+def _written(grid: Grid, tallies: Mapping[int, Tally], out: Path) -> Power:
+    """`power.json`, report and figures of the tallies of all chunks."""
+    found = power_of(grid, (tallies[number] for number in range(len(tallies))), grid_assumptions(grid))
     storage.write_whole(out / "power.json", as_json(found))
     with labelled(grid.labels):
         write_page(out, f"Simulated power: {grid.config.design.title}", sections(found, out / "figures"))
-    kept.unlink(missing_ok=True)
     return found
 
 
@@ -72,29 +147,40 @@ def job_of(grid: Grid) -> str:
     return sha256([provenance(), grid.request.seed, grid.request.null, published, chunks])
 
 
-def _tallies(chunks: Sequence[Chunk], run: RunPieces, kept: Path, tell: Callable[[str], None]) -> list[Tally]:
-    """The tally of each chunk, in their order; those that `kept` holds are not worked out again."""
-    found = dict(_kept(kept))
-    for number in found:
-        tell(_name(chunks[number]))
-    missing = [number for number in range(len(chunks)) if number not in found]
-    descriptor = storage.reopen(kept) if kept.exists() else storage.create(kept)
-    if found or os.fstat(descriptor).st_size:
-        storage.write_all(descriptor, b"\n")  # after a line that a kill may have cut
+def _job(grid: Grid) -> Job:
+    return Job(sha256=job_of(grid), request=grid.request, provenance=provenance())
 
-    def keep(place: int, tally: Tally) -> None:
-        number = missing[place]
-        found[number] = tally
-        storage.write_all(descriptor, json.dumps([number, asdict(tally)]).encode() + b"\n")
-        tell(_name(chunks[number]))
 
-    try:
-        run(run_chunk, [chunks[number] for number in missing], keep)
-    finally:
-        os.close(descriptor)
-        if not found:
-            kept.unlink(missing_ok=True)
-    return [found[number] for number in range(len(chunks))]
+def _tallies(
+    chunks: Sequence[Chunk], numbers: Sequence[int], run: RunPieces, kept: Path, progress: Progress
+) -> dict[int, Tally]:
+    """The tallies of the chunks of these numbers; those that `kept` holds are not worked out again."""
+    with progress("power", len(numbers)) as tell:
+        storage.make_folder(kept.parent)
+        found = dict(_kept(kept))
+        for number in found:
+            tell(_name(chunks[number]))
+        missing = [number for number in numbers if number not in found]
+        descriptor = storage.reopen(kept) if kept.exists() else storage.create(kept)
+        if found or os.fstat(descriptor).st_size:
+            storage.write_all(descriptor, b"\n")  # after a line that a kill may have cut
+
+        def keep(place: int, tally: Tally) -> None:
+            number = missing[place]
+            found[number] = tally
+            storage.write_all(descriptor, json.dumps([number, asdict(tally)]).encode() + b"\n")
+            tell(_name(chunks[number]))
+
+        try:
+            run(run_chunk, [chunks[number] for number in missing], keep)
+        finally:
+            os.close(descriptor)
+            if not found:
+                kept.unlink(missing_ok=True)
+    return {number: found[number] for number in numbers}  # however they ended, so that a shard has the same bytes
+
+
+_KEPT = TypeAdapter(tuple[int, Tally])
 
 
 def _kept(path: Path) -> Iterator[tuple[int, Tally]]:
@@ -102,14 +188,8 @@ def _kept(path: Path) -> Iterator[tuple[int, Tally]]:
     if not path.exists():
         return
     for line in path.read_bytes().splitlines():
-        with contextlib.suppress(ValueError, KeyError):
-            number, kept = json.loads(line)
-            sums = {name: (total, squares) for name, (total, squares) in kept["sums"].items()}
-            of_methods, of_error = kept["mean_squares"]
-            yield (
-                number,
-                Tally(studies=kept["studies"], held=kept["held"], sums=sums, mean_squares=(of_methods, of_error)),
-            )
+        with contextlib.suppress(ValueError):
+            yield _KEPT.validate_python(json.loads(line))
 
 
 def _name(chunk: Chunk) -> str:
