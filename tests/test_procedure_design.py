@@ -61,6 +61,12 @@ REFUSED = [
     (ONE, {"order": {"session": ["voltage_V"]}}, "voltage_V must vary from trial to trial"),
     (ONE, {"procedure": {"of": ["voltage_V", "method"]}}, "two factors take the rule entropy"),
     (ONE, {"procedure": {**TWO}}, "rise is missing"),
+    (
+        OTHER,
+        {"factors": {"voltage_V": {"levels": [6.0, 8.0]}}, "procedure": {"of": ["pulse_s", "voltage_V"]}},
+        "procedure.of = pulse_s, voltage_V: up-down chooses one factor",
+    ),
+    (OTHER, {"procedure": {"steps": [2.0, 0.5], "step_as": "factor"}}, "0.5 is a factor that right answers divide by"),
     (ONE, {"factors": {"voltage_V": {"levels": {"minimum": 4.0, "maximum": 4.4, "grain": 0.3}}}}, "does not divide"),
 ]
 

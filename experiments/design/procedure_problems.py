@@ -142,6 +142,16 @@ def _start_problems(table: AdaptiveConfig, levels: NumericLevels) -> Iterator[st
 
 def _walk_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels, guess: float) -> Iterator[str]:
     name = table.of[0]
+    if len(table.of) > 1:
+        yield f"procedure.of = {', '.join(table.of)}: {table.kind} chooses one factor; two take the kind posterior"
+        return
+    backwards = [size for size in getattr(table, "steps", ()) if table.step_as == "factor" and size <= 1]
+    if backwards:
+        yield (
+            f"procedure.steps: {backwards[0]:g} is a factor that right answers divide by, so it must be above 1; "
+            "the track would go the wrong way"
+        )
+        return
     if not are_even(levels):
         yield f"factors.{name}.levels: steps up and down need them at even distances; give minimum, maximum and grain"
         return
