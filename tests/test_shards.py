@@ -15,7 +15,7 @@ from hypothesis import strategies as some
 from analysis.predict.power import run as feature
 from analysis.predict.power.grid import Chunk, PowerRequest, make_grid, run_chunk
 from analysis.predict.power.planned import Tally
-from analysis.predict.power.shards import Job, Part, Shard, read_shard, write_shard
+from analysis.predict.power.shards import Job, Shard, ShardNumber, read_shard, write_shard
 from analysis.report.terminal import unseen
 from device.words import RecoilError
 from experiments.config.door import ConfigError
@@ -30,7 +30,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small grid as three shards, the last first, each in a folder of its own as some schedulers have it."""
     folder = tmp_path_factory.mktemp("parts")
     for number in (3, 1, 2):
-        feature.power_shard(SMALL, Part(number=number, of=3), folder / str(number), unseen, workers=1)
+        feature.power_shard(SMALL, ShardNumber(number=number, of=3), folder / str(number), unseen, workers=1)
     return folder
 
 
@@ -61,7 +61,7 @@ def test_any_division_in_any_order_has_every_piece_once_with_the_same_numbers(of
     random.shuffle(numbers)  # type: ignore[attr-defined]
     found = dict[int, Tally]()
     for number in numbers:
-        for piece in Part(number=number, of=of).pieces(CHUNKS)[::-1]:
+        for piece in ShardNumber(number=number, of=of).pieces(CHUNKS)[::-1]:
             assert piece not in found
             found[piece] = run_chunk(CHUNKS[piece])
     assert [found[piece] for piece in range(len(CHUNKS))] == ONE_RUN
@@ -71,7 +71,7 @@ def test_any_division_in_any_order_has_every_piece_once_with_the_same_numbers(of
 @given(studies=some.lists(some.integers(1, 5_000), min_size=1, max_size=60), of=some.integers(1, 70))
 def test_no_shard_has_more_work_than_another_by_more_than_a_piece(studies: list[int], of: int) -> None:
     chunks: list[Chunk] = [replace(CHUNKS[0], studies=count) for count in studies]
-    pieces = [Part(number=number, of=of).pieces(chunks) for number in range(1, of + 1)]
+    pieces = [ShardNumber(number=number, of=of).pieces(chunks) for number in range(1, of + 1)]
     assert sorted(piece for one in pieces for piece in one) == list(range(len(chunks)))
     work = [sum(chunks[piece].people for piece in one) for one in pieces]
     assert max(work) - min(work) <= max(chunk.people for chunk in chunks)
@@ -93,7 +93,7 @@ def test_a_shard_is_read_as_it_was_written_to_the_last_bit_and_in_its_order(
     tallies: dict[int, Tally], tmp_path: Path
 ) -> None:
     job = Job(sha256="0", request=SMALL, provenance={"numpy": "2"})
-    shard = Shard(part=Part(number=2, of=5), job=job, tallies=tallies)
+    shard = Shard(part=ShardNumber(number=2, of=5), job=job, tallies=tallies)
     again = read_shard(write_shard(tmp_path, shard))
     assert again == shard
     for number, tally in tallies.items():
@@ -133,7 +133,7 @@ def double(folder: Path) -> None:
 def another(**options: object) -> Callable[[Path], None]:
     def spoil(folder: Path) -> None:
         request = replace(SMALL, **options)  # type: ignore[arg-type]
-        feature.power_shard(request, Part(number=3, of=3), folder / "3", unseen, workers=1)
+        feature.power_shard(request, ShardNumber(number=3, of=3), folder / "3", unseen, workers=1)
 
     return spoil
 
@@ -153,7 +153,7 @@ def of_another_config(folder: Path) -> None:
 
 
 def divided_otherwise(folder: Path) -> None:
-    feature.power_shard(SMALL, Part(number=4, of=64), folder, unseen, workers=1)
+    feature.power_shard(SMALL, ShardNumber(number=4, of=64), folder, unseen, workers=1)
 
 
 def config_gone(folder: Path) -> None:
@@ -205,7 +205,7 @@ def interrupted(_: str, __: int) -> Iterator[Callable[[str], None]]:
 
 
 def test_an_interrupted_shard_goes_on_where_it_was(parts: Path, tmp_path: Path) -> None:
-    part = Part(number=1, of=3)
+    part = ShardNumber(number=1, of=3)
     with pytest.raises(KeyboardInterrupt):
         feature.power_shard(SMALL, part, tmp_path, interrupted, workers=1)
     (kept,) = tmp_path.iterdir()
@@ -224,11 +224,11 @@ def test_a_shard_that_is_there_is_not_worked_out_again(parts: Path) -> None:
     def never(_: str, __: int) -> None:
         raise AssertionError
 
-    again = feature.power_shard(SMALL, Part(number=1, of=3), parts / "1", never)  # type: ignore[arg-type]
+    again = feature.power_shard(SMALL, ShardNumber(number=1, of=3), parts / "1", never)  # type: ignore[arg-type]
     assert len(again.tallies) == 3
 
 
 def test_a_shard_for_which_no_work_is_left_says_so(tmp_path: Path) -> None:
-    empty = feature.power_shard(SMALL, Part(number=64, of=64), tmp_path, unseen, workers=1)
+    empty = feature.power_shard(SMALL, ShardNumber(number=64, of=64), tmp_path, unseen, workers=1)
     assert "fewer shards would do" in feature.shard_in_short(empty, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["shard-64-of-64.json"]

@@ -5,9 +5,7 @@ from __future__ import annotations
 import random
 import signal
 import subprocess
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -59,12 +57,12 @@ def test_64_shards_and_one_run(one: Path, shards: Path, tmp_path: Path, soak: So
 
 def test_jobs_that_are_killed_and_started_again(shards: Path, tmp_path: Path, soak: Soak) -> None:
     for number in range(1, 9):
-        words = [RECOIL, "power", *WORDS, "--workers", "1", "--shard", f"{number}/8", "--out", tmp_path]
-        with subprocess.Popen(words, stderr=subprocess.DEVNULL) as running:
+        words = (*WORDS, "--workers", "1", "--shard", f"{number}/8", "--out", str(tmp_path))
+        with subprocess.Popen([RECOIL, "power", *words], stderr=subprocess.DEVNULL) as running:
             wait_for(lambda: [kept for kept in tmp_path.glob("unfinished*") if kept.stat().st_size])
             running.send_signal(signal.SIGKILL)
         assert not (tmp_path / f"shard-{number}-of-8.json").exists()
-        power(*WORDS, "--workers", 1, "--shard", f"{number}/8", "--out", tmp_path)
+        power(*words)
     for folder in (tmp_path, shards):
         power("--merge", folder, "--out", folder / "merged")
     equal = files(tmp_path / "merged") == files(shards / "merged")
@@ -73,20 +71,12 @@ def test_jobs_that_are_killed_and_started_again(shards: Path, tmp_path: Path, so
     assert equal
 
 
-@contextmanager
-def cluster() -> Iterator[str]:
-    import distributed
-
+def test_a_shard_worked_out_on_dask(shards: Path, tmp_path: Path, soak: Soak) -> None:
+    distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
-    ) as running:
-        yield running.scheduler_address
-
-
-def test_a_shard_worked_out_on_dask(shards: Path, tmp_path: Path, soak: Soak) -> None:
-    with cluster() as address:
-        words = ("--workers", 1, "--shard", f"1/{JOBS}", "--scheduler", address)
-        power(*WORDS, *words, "--out", tmp_path)
+    ) as cluster:
+        job(1, tmp_path, "--scheduler", cluster.scheduler_address)
     equal = files(tmp_path)["shard-1-of-64.json"] == (shards / "shard-1-of-64.json").read_bytes()
     soak("a shard on 2 Dask workers against 1 process", "equal" if equal else "other", "byte for byte", "1 of 64")
     assert equal

@@ -92,7 +92,7 @@ def power(
     )
     if shard is not None:
         done = feature.power_shard(
-            request, feature.part_of(shard), out, terminal.progress, workers=workers, scheduler=scheduler
+            request, feature.shard_number(shard), out, terminal.progress, workers=workers, scheduler=scheduler
         )
         terminal.show(done, feature.shard_in_short(done, out), as_json)
         return

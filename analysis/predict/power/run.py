@@ -17,7 +17,16 @@ from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, ru
 from analysis.predict.power.page import grid_assumptions, in_short, sections
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.results import Power, power_of
-from analysis.predict.power.shards import Job, Part, Shard, part_of, read_shard, shards_in, tallies_of, write_shard
+from analysis.predict.power.shards import (
+    Job,
+    Shard,
+    ShardNumber,
+    read_shard,
+    shard_number,
+    shards_in,
+    tallies_of,
+    write_shard,
+)
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.serial import as_json
@@ -27,7 +36,7 @@ from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["PowerRequest", "in_short", "merged_power", "part_of", "power", "power_shard", "shard_in_short"]
+__all__ = ["PowerRequest", "in_short", "merged_power", "power", "power_shard", "shard_in_short", "shard_number"]
 
 
 def power(
@@ -51,7 +60,7 @@ def power(
 
 def power_shard(
     request: PowerRequest,
-    part: Part,
+    part: ShardNumber,
     out: Path,
     progress: Progress,
     *,

@@ -27,7 +27,7 @@ _FILES = {"config", "paper"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class ShardNumber:
     """Shard `number`, from 1, of so many (`of`)."""
 
     number: int
@@ -47,12 +47,12 @@ class Part:
         return sorted(by_people[self.number - 1 :: self.of])
 
 
-def part_of(text: str) -> Part:
+def shard_number(text: str) -> ShardNumber:
     """The shard that `--shard` names. `ConfigError` unless it is K/N with K from 1 to N."""
     match = re.fullmatch(r"\s*([0-9]{1,9})\s*/\s*([0-9]{1,9})\s*", text, re.ASCII)
     if not match:
         raise ConfigError(f"--shard {text}: must be K/N, as in 3/64 for the third of 64 shards")
-    part = Part(number=int(match[1]), of=int(match[2]))
+    part = ShardNumber(number=int(match[1]), of=int(match[2]))
     if not 1 <= part.of <= _MOST:
         raise ConfigError(f"--shard {text}: there must be from 1 to {_MOST} shards, not {part.of}")
     if not 1 <= part.number <= part.of:
@@ -93,7 +93,7 @@ def _shown(value: object) -> str:
 class Shard:
     """A shard that is done: the tally of each of its chunks, by the chunk's number."""
 
-    part: Part
+    part: ShardNumber
     job: Job
     tallies: Mapping[int, Tally]
 
@@ -177,7 +177,7 @@ def _divided(shards: Mapping[Path, Shard], of: int) -> Iterator[str]:
 
 
 def _doubled(shards: Mapping[Path, Shard]) -> Iterator[str]:
-    first = dict[Part, Path]()
+    first = dict[ShardNumber, Path]()
     for path, one in shards.items():
         if first.setdefault(one.part, path) != path:
             yield f"{path}: is shard {one.part}, as {first[one.part]} is; leave one of the two"
@@ -187,7 +187,7 @@ def _missing(folder: Path, there: set[int], of: int) -> Iterator[str]:
     missing = [number for number in range(1, of + 1) if number not in there]
     if not missing:
         return
-    part = Part(number=missing[0], of=of)
+    part = ShardNumber(number=missing[0], of=of)
     if len(missing) == 1:
         yield f"{folder}: {part.file_name} is missing; run its job with --shard {part}"
     else:
