@@ -18,7 +18,7 @@ from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
-from experiments.session.steps import Inform, Prepare, Rest
+from experiments.session.steps import FireShot, Inform, Prepare, Rest
 from experiments.study.folders import place
 from recoil.config_files import copy_began_with
 from tests.designs import changed, path_of
@@ -129,6 +129,24 @@ def test_a_hand_sets_the_damper_once_a_session_where_the_design_says_so(tmp_path
     assert len(set(settings[:6])) == len(set(settings[6:])) == 1
     assert settings[0] != settings[-1]
     assert not any(isinstance(step, Rest) for step, _ in told) or SETUPS["realism"].config.breaks.between_sessions_s
+
+
+def test_what_hands_do_tells_nobody_which_interval_is_empty(tmp_path):
+    request = RunRequest(setup=load_setup("staircase"), participant_id="P01", results=tmp_path, seed=5)
+    done = run(request, synthetic_screen, VirtualClock())
+    told = [step for step, _ in history(read_journal(done.place.journal)) if isinstance(step, Prepare | FireShot)]
+    seen = {
+        trial.intervals: [
+            (type(step), step.interval, step.settings if isinstance(step, Prepare) else step.gap_s)
+            for step in told
+            if step.trial == trial and step.attempt == 1
+        ]
+        for trial in done.plan.trials
+        if any(step.trial == trial for step in told)
+    }
+    first, second = seen.values()
+    assert first == second
+    assert [kind for kind, _, _ in first] == [Prepare, FireShot, FireShot]
 
 
 def test_a_practice_has_some_of_each_cell_and_is_kept_apart(tmp_path):

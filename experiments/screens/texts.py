@@ -67,8 +67,9 @@ def short_place(trial: Trial, here: Trial) -> str:
 
 
 def again_text(told: History, step: Prepare) -> str:
-    """How often a trial was felt already, as the table counts its attempts; empty if never."""
-    before = sum(is_attempt(one, word) for one, word in told if trial_of(one) == step.trial)
+    """How often a trial was felt before this attempt, as the table counts attempts; empty if never."""
+    felt = sum(is_attempt(one, word) for one, word in told if trial_of(one) == step.trial)
+    before = felt - (step.interval > 0)  # the first shot of this one is among them
     return f"Presented again, for the {_nth(before + 1)} time." if before else ""
 
 

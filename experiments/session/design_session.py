@@ -163,7 +163,7 @@ class _Script:
         last: object = None
         for interval in range(max(1, len(trial.intervals))):
             by_hand = self._by_hand(trial, interval)
-            handed_over = last is None or by_hand not in (None, last)
+            handed_over = interval == 0 or by_hand not in (None, last)
             if handed_over:
                 yield Prepare(
                     trial=trial,
@@ -173,13 +173,18 @@ class _Script:
                     interval=interval,
                 )
             yield self._stimulus(trial, interval, 0.0 if handed_over else self.design.trial.gap_s)
-            last = last if by_hand is None else by_hand
-            last = () if last is None else last
+            if handed_over:
+                last = self._held(trial, interval)
 
     def _by_hand(self, trial: Trial, interval: int) -> object:
         """What hands do for an interval; `None` where nothing is felt, and so nothing is to be done."""
         levels = trial.levels_at(interval)
         return None if levels is None else (trial.direction_at(interval), settings(self.design, self.gun, levels))
+
+    def _held(self, trial: Trial, interval: int) -> object:
+        """What hands do before an interval; before an empty one as for one that is not, which it must not give away."""
+        done = (self._by_hand(trial, place) for place in (interval, *range(len(trial.intervals))))
+        return next((by_hand for by_hand in done if by_hand is not None), None)
 
     def _settings(self, trial: Trial, interval: int) -> tuple[tuple[str, str], ...]:
         """What is set by hand: of an empty interval, as for one that is not; of a catch trial what does not vary."""
