@@ -39,7 +39,7 @@ from experiments.study.preregistration import FreezeStatus
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 
-_MOST_CELLS = 60
+_MOST_CELLS = 40
 """So many cells are listed."""
 _EXPECTED_EVEN = 5
 """Of fewer participants nobody expects first positions to be even."""
@@ -279,11 +279,15 @@ def _cells(cells: Sequence[CellCheck]) -> Table:
             f"{1000 * cell.settle_s:.0f} ms",
             cell.status,
         )
-        for cell in cells[:_MOST_CELLS]
+        for cell in cells
     )
-    more = f" ({_MOST_CELLS} of {len(cells)})" if len(cells) > _MOST_CELLS else ""
     header = (*names, *(("Set by hand",) if by_hand else ()), "Drive", "Peak force", "Next after", "By the model")
-    return Table(caption=f"Cells{more}", header=header, rows=rows)
+    if len(rows) <= _MOST_CELLS:
+        return Table(caption="Cells", header=header, rows=rows)
+    ends = _MOST_CELLS // 2
+    between = (f"… {len(rows) - 2 * ends} more …", *[""] * (len(header) - 1))
+    caption = f"Cells ({2 * ends} of {len(cells)}: the first and the last)"
+    return Table(caption=caption, header=header, rows=(*rows[:ends], between, *rows[-ends:]))
 
 
 _TRIALS_SHOWN = 6

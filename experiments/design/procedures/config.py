@@ -130,7 +130,8 @@ class PriorConfig(Model):
         if self.mean is None or self.sd is None:
             return np.ones(self.points)
         off = np.log(self.values / self.mean) if self.spacing == "log" else self.values - self.mean
-        return np.asarray(np.exp(-0.5 * (off / self.sd) ** 2))
+        with np.errstate(over="ignore"):  # an sd of next to nothing: only the mean itself is likely
+            return np.asarray(np.exp(-0.5 * (off / self.sd) ** 2))
 
 
 def _prior_problems(prior: PriorConfig) -> Iterator[str]:
@@ -145,6 +146,8 @@ def _prior_problems(prior: PriorConfig) -> Iterator[str]:
         yield "mean and sd go together; give both for a normal prior, or neither for an even one"
     if prior.mean is not None and not low <= prior.mean <= high:
         yield f"mean {prior.mean:g} is outside of {low:g} to {high:g}, so the prior excludes it"
+    elif prior.sd is not None and not prior.weights.any():
+        yield f"sd {prior.sd:g}: of the {prior.points} values none is near enough to mean {prior.mean:g}; make it larger"
 
 
 class PosteriorConfig(TracksConfig):
