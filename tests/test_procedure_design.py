@@ -49,7 +49,7 @@ REFUSED = [
     (OTHER, {"factors": {"pulse_s": {"levels": [0.002, 0.006, 0.008]}}}, "need them at even distances"),
     (ONE, {"procedure": {"start": 3.0}}, "start = 3 is excluded by the prior of the threshold, 4 to 20"),
     (ONE, {"procedure": {"threshold": {"mean": 30.0, "sd": 2.0}}}, "mean 30 is outside of 4 to 20"),
-    (ONE, {"procedure": {"threshold": {"mean": 10.1, "sd": 1e-9}}}, "none is near enough to mean 10.1"),
+    (ONE, {"procedure": {"threshold": {"mean": 10.1, "sd": 1e-9}}}, "values is near enough to mean 10.1"),
     (ONE, {"procedure": {"threshold": {"minimum": 21.0, "maximum": 25.0}}}, "21 to 25, holds none of the levels"),
     (ONE, {"procedure": {"width": {"minimum": 0.0}}}, "minimum 0 must be above 0"),
     (ONE, {"procedure": {"lapse": {"minimum": 0.0, "maximum": 0.6, "points": 3}}}, "leave nothing to feel"),

@@ -147,7 +147,7 @@ def _prior_problems(prior: PriorConfig) -> Iterator[str]:
     if prior.mean is not None and not low <= prior.mean <= high:
         yield f"mean {prior.mean:g} is outside of {low:g} to {high:g}, so the prior excludes it"
     elif prior.sd is not None and not prior.weights.any():
-        yield f"sd {prior.sd:g}: of the {prior.points} values none is near enough to mean {prior.mean:g}; make it larger"
+        yield f"sd {prior.sd:g}: none of {prior.points} values is near enough to mean {prior.mean:g}; make it larger"
 
 
 class PosteriorConfig(TracksConfig):
