@@ -146,6 +146,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         _refuse_excluded(place, registered)
     with closing(_open_gun(request, stimuli, clock)) as gun:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
+        stimuli.work_out(plan.trials)
         told: GrowingHistory = []
         session, screen = design_session(plan, setup, told), make_screen(setup, plan, clock)
         with _open(place, before, clock) as journal:

@@ -330,7 +330,8 @@ class DeskGun:
     ) -> steps.Fired | steps.Failed | steps.Interrupted:
         """One shot, armed for it alone; in a catch trial, or an empty interval, nothing is armed and nothing fires."""
         felt = step.trial.with_chosen(step.chosen)
-        shot, asked, before = self._desk.stimuli.shot(felt, step.interval), False, step.interval > 0
+        levels, asked, before = felt.levels_at(step.interval), False, step.interval > 0
+        shot = None if levels is None else self._desk.stimuli.of_levels(levels)
         try:
             if shot is None:
                 return self._nothing(step, not_before_s)

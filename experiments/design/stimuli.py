@@ -100,6 +100,12 @@ class Stimuli:
         levels = trial.levels_at(interval)
         return None if levels is None else self.of_levels(levels)
 
+    def work_out(self, trials: Iterable[Trial]) -> None:
+        """The shots of trials whose levels are known, beforehand: nobody waits for them in a trial."""
+        for trial in (trial for trial in trials if not trial.track):
+            for place in range(max(1, len(trial.intervals))):
+                self.shot(trial, place)
+
     def first_shot(self, trials: Iterable[Trial]) -> Shot:
         """The first shot that is felt in some trials; a track's is at the highest levels, before any is chosen."""
         filled = (trial.with_chosen(self.highest) if trial.track else trial for trial in trials)
