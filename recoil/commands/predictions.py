@@ -29,6 +29,7 @@ SimulatedOption = Annotated[
 ]
 NullOption = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
 SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
+POWER_TARGET, PAPER_CONFIG = 0.8, "paper"
 ConfigUnlessMergedArgument = Annotated[
     str | None, typer.Argument(help="File or name of a shipped config; with --merge that of the shards unless given.")
 ]
@@ -48,10 +49,10 @@ def power(
     methods: MethodsOption = None,
     effect: EffectOption = None,
     studies: SimulatedOption = None,
-    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
+    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = POWER_TARGET,
     null: NullOption = False,
     seed: terminal.FixedSeedOption = 1,
-    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
+    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = PAPER_CONFIG,
     workers: terminal.WorkersOption = None,
     scheduler: SchedulerOption = None,
     shard: ShardOption = None,
@@ -72,12 +73,16 @@ def power(
     if config is None and merge is None:
         raise ConfigError("CONFIG is missing: name a file or a shipped config, as in `recoil power direction`")
     if config is not None and procedures_of(config):
-        others = {"--participants": participants, "--methods": methods, "--effect": effect, "--null": null}
-        elsewhere = {"--scheduler": scheduler, "--workers": workers, "--shard": shard, "--merge": merge}
-        _of_threshold(
-            config, trials, studies, seed, out, as_json, [name for name, one in {**others, **elsewhere}.items() if one]
-        )
-        return
+        given: dict[str, object] = {
+            "--participants": participants,
+            "--methods": methods,
+            "--effect": effect,
+            "--null": null,
+        }
+        given |= {"--scheduler": scheduler, "--workers": workers, "--shard": shard, "--merge": merge}
+        given |= {"--target": target != POWER_TARGET, "--paper": paper != PAPER_CONFIG}
+        unused = [name for name, one in given.items() if one]
+        return _of_threshold(config, trials, studies, seed, out, as_json, unused)
     request = feature.PowerRequest(
         config=config or "",
         participants=participants,
@@ -91,16 +96,14 @@ def power(
         paper=paper,
     )
     if shard is not None:
-        done = feature.power_shard(
-            request, feature.shard_number(shard), out, terminal.progress, workers=workers, scheduler=scheduler
-        )
-        terminal.show(done, feature.shard_in_short(done, out), as_json)
-        return
+        number = feature.shard_number(shard)
+        part = feature.power_shard(request, number, out, terminal.progress, workers=workers, scheduler=scheduler)
+        return terminal.show(part, feature.shard_in_short(part, out), as_json)
     if merge is None:
         found = feature.power(request, out, terminal.progress, workers, scheduler)
     else:
         found = feature.merged_power(merge, request, out)
-    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    return terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
 def _of_threshold(

@@ -65,6 +65,18 @@ def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure
         save(figure, path_stem)
 
 
+def panel_grid(figure: Figure, titles: Sequence[str], across: int) -> list[Axes]:
+    """A panel under each title, so many beside each other on shared axes; only the lowest have numbers below."""
+    rows = -(-len(titles) // across)
+    grid = list(figure.subplots(rows, across, squeeze=False, sharex=True, sharey=True).ravel())
+    for place, axes in enumerate(grid):
+        axes.set_visible(place < len(titles))
+        axes.tick_params(labelbottom=place + across >= len(titles))
+    for axes, title in zip(grid, titles, strict=False):
+        axes.set_title(drawn_name(title), loc="left", fontsize=9.0, parse_math=False)
+    return grid
+
+
 def save(figure: Figure, path_stem: Path) -> None:
     """`path_stem`.png, .svg and .pdf, without dates or versions inside. Folders are made."""
     path_stem.parent.mkdir(parents=True, exist_ok=True)

@@ -21,6 +21,7 @@ from analysis.report.figures.style import (
     method_colour,
     method_line,
     method_marker,
+    panel_grid,
     reference_line,
 )
 from analysis.stats.arrays import FloatArray
@@ -62,13 +63,9 @@ def figure_functions(found: DesignSummary, of: Thresholds, path_stem: Path) -> N
     across = min(_ACROSS, len(panels))
     rows = -(-len(panels) // across)
     with drawn(path_stem, max(0.6 + _WIDE_IN * across, 4.2), 0.7 + _HIGH_IN * rows) as figure:
-        grid = list(figure.subplots(rows, across, squeeze=False, sharex=True, sharey=True).ravel())
-        for axes, (title, curves) in zip(grid, panels, strict=False):
-            axes.set_title(drawn_name(title), loc="left", fontsize=9.0, parse_math=False)
+        grid = panel_grid(figure, [title for title, _ in panels], across)
+        for axes, (_, curves) in zip(grid, panels, strict=False):
             _draw(axes, curves, levels)
-        for place, axes in enumerate(grid):
-            axes.set_visible(place < len(panels))
-            axes.tick_params(labelbottom=place + across >= len(panels))
         _label(figure, grid, found, of)
 
 

@@ -17,6 +17,7 @@ from analysis.report.figures.style import (
     method_colour,
     method_line,
     method_marker,
+    panel_grid,
 )
 from analysis.summary.thresholds import Thresholds
 from analysis.summary.tracks import TrackAnswers
@@ -34,14 +35,10 @@ def figure_tracks(of: Thresholds, path_stem: Path) -> None:
     across = min(_ACROSS, len(people))
     rows = -(-len(people) // across)
     with drawn(path_stem, max(0.6 + _WIDE_IN * across, 4.2), 0.7 + _HIGH_IN * rows) as figure:
-        grid = list(figure.subplots(rows, across, squeeze=False, sharex=True, sharey=True).ravel())
+        grid = panel_grid(figure, people, across)
         for axes, who in zip(grid, people, strict=False):
-            axes.set_title(drawn_name(who), loc="left", fontsize=9.0, parse_math=False)
             _draw(axes, [track for track in of.tracks if track.participant == who], conditions)
             _draw_threshold(axes, of, who)
-        for place, axes in enumerate(grid):
-            axes.set_visible(place < len(people))
-            axes.tick_params(labelbottom=place + across >= len(people))
         grid[0].xaxis.set_major_locator(MaxNLocator(4, integer=True))
         figure.supxlabel("trial of the track", fontsize=9.0)
         figure.supylabel(factor_words(of.factor), fontsize=9.0)
