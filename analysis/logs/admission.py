@@ -179,9 +179,9 @@ class LogsSoFar:
 
     def _note_copy(self, one: WaitingFile) -> None:
         """The same table, with onsets to the µs, may stand elsewhere, as in a copy of the folder."""
-        if isinstance(one.content, bytes) and FULL_ONSET.search(one.content):
+        if isinstance(one.content, bytes):
             first = self.contents.setdefault(hash(one.content), one.path)
-            if first != one.path:
+            if first != one.path and FULL_ONSET.search(one.content):
                 self.same.setdefault(first, {first}).add(one.path)
 
     def leave_copies(self) -> None:
