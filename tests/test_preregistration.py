@@ -16,6 +16,7 @@ from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
 from analysis.summary.announced import names_of_tests
 from analysis.summary.designs import summarise
+from analysis.summary.analyze import Request, result_files
 from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
@@ -333,6 +334,30 @@ def test_other_rules_and_tests_than_were_frozen_are_told(begun: Path, tmp_path: 
     ]
     none = of_kind(told(begun, rules=None, requests=None), "analysis")
     assert [one.what for one in none] == ["--rules was not given", "a frozen test that was not made (--requests)"]
+
+
+def test_frozen_tests_are_made_unless_a_file_asks_for_others(study: Path) -> None:
+    of_ratings = REQUEST.replace("direction", "preference")
+    (study / "requests.toml").write_text(of_ratings + REQUEST)
+    freeze(study, "", RealClock())
+    for code in ("P01", "P02"):
+        do(study, code)
+    asked = Request(paths=[study / "results"], out=study / "out", rules=study / "rules.toml")
+
+    def made(request: Request) -> tuple[list[str], list[str], list[str]]:
+        found = json.loads(result_files(request)["statistics.json"])
+        tests = [one["what"] for one in found["preregistration"][0]["deviations"] if "test" in one["what"]]
+        warned = [one for one in found["warnings"] if "frozen test" in one]
+        return [f"{one['of']}: {one['note'][:35]}" for one in found.get("requested", [])], tests, warned
+
+    answered, tests, (warned,) = made(asked)
+    assert answered == ["preference: Asked for by the preregistration. B"]
+    assert tests == ["a frozen test that was not made (--requests)"]
+    assert warned.startswith("a frozen test is not made: requests.1: of = 'direction': there are no logs of it")
+    (study / "requests.toml").write_text(of_ratings)
+    answered, tests, warnings = made(replace(asked, requests=study / "requests.toml"))
+    assert answered == ["preference: Bayes factor of the repeated-measur"]
+    assert (tests, warnings) == (["a frozen test that was not made (--requests)"], [])
 
 
 # what was edited, or is missing

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pydantic import JsonValue
+
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study, left_out_by_files
 from analysis.logs.files import shown_name
@@ -17,10 +19,10 @@ from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, Tell, unseen, untold
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
-from analysis.summary.deviations import AnalysisFiles, deviations
+from analysis.summary.deviations import AnalysisFiles, deviations, frozen_tests
 from analysis.summary.participation import exclusion_lines, participation
-from analysis.summary.request_data import answers_to
-from analysis.summary.requests import Requests
+from analysis.summary.request_data import answers_to, frozen_answer
+from analysis.summary.requests import Requested, Requests
 from analysis.summary.results import RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
@@ -79,12 +81,16 @@ class _Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Analysed:
-    """Logs of one kind of data, their statistics, what rules did to them, and the tables of results by file name."""
+    """Logs of one kind of data, their statistics, what rules did to them, and the tables of results by file name.
+
+    `frozen`: the tests of the preregistration that were made, as no others were asked for.
+    """
 
     logs: Logs
     statistics: StudyStatistics
     effect: ExclusionEffect | None
     tables: Mapping[str, bytes]
+    frozen: tuple[JsonValue, ...] = ()
 
 
 def analyze(
@@ -139,7 +145,8 @@ def _analysis(
     main = _analysed(first, files, request, tell)
     others = [_analysed(part, files, request, apart=True) for part in logs.apart]
     kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
-    frozen, edited = deviations(first, request.files) if request.against_frozen else ((), ())
+    used = replace(request.files, answered=main.frozen)
+    frozen, edited = deviations(first, used) if request.against_frozen else ((), ())
     statistics = replace(main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None)
     told = _told(main)
     compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))
@@ -218,11 +225,15 @@ def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, 
             if not apart:
                 raise
             statistics = replace(statistics, warnings=(*statistics.warnings, f"not answered here: {error}"))
+    frozen: tuple[JsonValue, ...] = ()
+    if request.requests is None and request.against_frozen and not apart:
+        statistics, frozen = _with_frozen(statistics, used)
     return _Analysed(
         logs=used,
         statistics=with_everybody(statistics, used),
         effect=effect,
         tables=result_tables(used, statistics.analysed),
+        frozen=frozen,
     )
 
 
@@ -235,6 +246,20 @@ def _with_requested(statistics: StudyStatistics, logs: Logs, asked: _Asked, requ
     if asked.requests is None or request.requests is None:
         return statistics
     return replace(statistics, requested=answers_to(asked.requests, request.requests, logs))
+
+
+def _with_frozen(statistics: StudyStatistics, logs: Logs) -> tuple[StudyStatistics, tuple[JsonValue, ...]]:
+    """The statistics with the tests that were frozen, as far as the data have what they name, and those tests."""
+    found, made, warnings = list[Requested](), list[JsonValue](), list[str]()
+    for place, test in enumerate(frozen_tests(logs)):
+        try:
+            found.append(frozen_answer(test, logs))
+        except ValueError as error:
+            warnings.append(f"a frozen test is not made: requests.{place}: {error}")
+        else:
+            made.append(test)
+    said = (*statistics.warnings, *warnings)
+    return replace(statistics, requested=tuple(found) or None, warnings=said), tuple(made)
 
 
 def _told(one: _Analysed) -> ReportData:

@@ -12,7 +12,7 @@ from pydantic import JsonValue
 
 from analysis.logs.journals import RunFile
 from analysis.logs.reading import Logs
-from experiments.config.door import PreregistrationConfig, read_toml
+from experiments.config.door import read_toml
 from experiments.record import journal
 from experiments.record.journal import Head, JournalError
 from experiments.record.provenance import recoil_version
@@ -71,10 +71,14 @@ class StudyDeviations:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalysisFiles:
-    """The files that an analysis was made with, and whether with fits of the diffusion model."""
+    """The files that an analysis was made with, and whether with fits of the diffusion model.
+
+    `answered`: without a file of requests, the frozen tests that were made all the same.
+    """
 
     rules: Path | None = None
     requests: Path | None = None
+    answered: tuple[JsonValue, ...] = ()
     codebook: Path | None = None
     paper: Path | None = None
     fits: bool = False
@@ -305,7 +309,7 @@ def _analysis(last: Preregistration, used: AnalysisFiles) -> Iterator[Deviation]
     yield from _file(last, "--codebook", own.codebook, used.codebook)
     if last.study.paper is not None and used.paper is not None:
         yield from _file(last, "--paper", last.study.paper, used.paper)
-    yield from _requests(last, own, used)
+    yield from _requests(last, used)
     if own.fits != used.fits:
         yield Deviation(kind="analysis", what="--fits: the diffusion model", frozen=own.fits, instead=used.fits)
     yield from _version("Recoil in this analysis", last, recoil_version())
@@ -322,16 +326,28 @@ def _file(last: Preregistration, option: str, name: str | None, path: Path | Non
         yield Deviation(kind="analysis", what=what, frozen=change.frozen, instead=change.now)
 
 
-def _requests(last: Preregistration, own: PreregistrationConfig, used: AnalysisFiles) -> Iterator[Deviation]:
+def _requests(last: Preregistration, used: AnalysisFiles) -> Iterator[Deviation]:
     """Tests that were not frozen, which are exploratory, and those that were and are not made."""
-    frozen = [] if own.requests is None else _tests(last.files.get(own.requests, {}))
-    made = [] if used.requests is None else _tests(read_toml(used.requests))
+    frozen = _frozen_tests(last)
+    made = used.answered if used.requests is None else _tests(read_toml(used.requests))
     for one in made:
         if one not in frozen:
             yield Deviation(kind="analysis", what="a test that was not frozen: exploratory", instead=one)
     for one in frozen:
         if one not in made:
             yield Deviation(kind="analysis", what="a frozen test that was not made (--requests)", frozen=one)
+
+
+def frozen_tests(logs: Logs) -> Sequence[JsonValue]:
+    """The tests that the one study of these logs has frozen last; of several studies none."""
+    folders = [Path(results) for results in logs.names if Path(results).is_absolute()]
+    last = read_chain(folders[0].parent).last if len(folders) == 1 else None
+    return [] if last is None else _frozen_tests(last)
+
+
+def _frozen_tests(last: Preregistration) -> Sequence[JsonValue]:
+    name = last.study.preregistration.requests
+    return [] if name is None else _tests(last.files.get(name, {}))
 
 
 def _tests(values: FileValues) -> Sequence[JsonValue]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
+from pydantic import JsonValue
 
 from analysis.logs.exclusions import complete_rows
 from analysis.logs.measures import MEASURES
@@ -33,6 +36,13 @@ def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]
     if faults:
         raise ConfigError("\n".join(faults))
     return tuple(found)
+
+
+def frozen_answer(test: JsonValue, logs: Logs) -> Requested:
+    """The answer to a test as a preregistration holds it. `ValueError`: the data have not what it names."""
+    (request,) = Requests.model_validate_json(json.dumps({"requests": [test]})).requests
+    found = answer_to(request, request_data(logs, request))
+    return replace(found, note=f"Asked for by the preregistration. {found.note}")
 
 
 def request_data(logs: Logs, request: AnyRequest) -> RequestData:
