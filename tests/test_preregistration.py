@@ -14,9 +14,9 @@ from analysis.archive.making import preregistration_faults
 from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
+from analysis.summary.analyze import Request, result_files
 from analysis.summary.announced import names_of_tests
 from analysis.summary.designs import summarise
-from analysis.summary.analyze import Request, result_files
 from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
