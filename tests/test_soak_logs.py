@@ -59,14 +59,32 @@ summarize(read_logs([Path(sys.argv[1])]), fits=True)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
 
+WHAT_FOLLOWS = """
+import json, statistics, sys, time
+from pathlib import Path
+from analysis.logs.reading import read_logs
+from analysis.summary.analyze import Request, analyze
+from analysis.summary.summary import summarize
+folder, out = map(Path, sys.argv[1:])
+def seconds(work):
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+found = []
+for _ in range(4):
+    whole = seconds(lambda: analyze(Request(paths=[folder], out=out)))
+    found.append(whole - seconds(lambda: summarize(read_logs([folder]))))
+print(json.dumps(statistics.median(found[1:])))
+"""
+
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_many(tmp_path_factory.mktemp("many"), LOGS)
 
 
-def _child(program: str, folder: Path) -> Any:
-    words = [sys.executable, "-c", program, folder]
+def _child(program: str, *folders: Path) -> Any:
+    words = [sys.executable, "-c", program, *folders]
     return json.loads(subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout)
 
 
@@ -118,6 +136,14 @@ def test_holding_every_log_against_its_journal_against_the_same_loop(sealed: Pat
     soak("read, checked against journals and analysed, times faster than the loop", f"{ratio:.1f}", "2", how)
     soak("the reading and checking of these, of the loop's time", f"{read:.0%}", "stated", how)
     assert ratio >= 2
+
+
+def test_what_follows_reading_and_statistics(logs: Path, tmp_path: Path, soak: Soak) -> None:
+    write_many(tmp_path / "one", 1)
+    one, many = (_child(WHAT_FOLLOWS, folder, tmp_path / "out") for folder in (tmp_path / "one", logs))
+    how = f"tables, figures and pages of {LOGS} people {many:.1f} s, of one {one:.1f} s; medians of 3"
+    soak("what follows reading and statistics costs more", f"{many - one:.1f} s", "2 s", how)
+    assert many - one < 2.0
 
 
 def test_memory(logs: Path, soak: Soak) -> None:

@@ -86,7 +86,7 @@ class LogsSoFar:
     experiments: dict[int, str] = field(default_factory=dict)
     kinds: dict[int, DataKind | None] = field(default_factory=dict)
     """Whose data each good log holds; None where nobody answered."""
-    earlier: dict[tuple[str, str, str], list[int]] = field(default_factory=dict)
+    earlier: dict[tuple[str, str, str], tuple[int, ...]] = field(default_factory=dict)
     """The logs of each study, experiment and code, upper and lower case alike."""
     paths: dict[int, str] = field(default_factory=dict)
     """The files of good logs, numbered."""
@@ -167,7 +167,8 @@ class LogsSoFar:
         return self.members[results]
 
     def _check_new(self, study: str, log: Log, number: int) -> None:
-        earlier = self.earlier.setdefault((study, log.experiment, log.code.casefold()), [])
+        key = study, log.experiment, log.code.casefold()
+        earlier = self.earlier.get(key, ())
         first = next((one for one in earlier if self._go_together(one, number)), None)
         if first is not None:
             there = self.codes[first]
@@ -175,7 +176,7 @@ class LogsSoFar:
             rule = "(rule: one log a participant and experiment, upper and lower case alike)"
             message = f"{name} has a {log.experiment} log already in {self.paths[first // LOGS_A_FILE]} {rule}"
             raise BadLogError(message, None, "participant_id")
-        earlier.append(number)
+        self.earlier[key] = (*earlier, number)
 
     def _note_copy(self, one: WaitingFile) -> None:
         """The same table, with onsets to the µs, may stand elsewhere, as in a copy of the folder."""

@@ -35,7 +35,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis.logs.files import Problem, below, names_below
+from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.logs.mapped_people import ShortText
 from analysis.logs.measures import MEASURES
 from analysis.logs.reading import Logs
@@ -162,18 +162,22 @@ def left_out_by_files(logs: Logs) -> tuple[LeftOut, ...]:
     What is no log, as a register or a folder without one, leaves nobody out by itself.
     """
     problems = [one for one in logs.problems if one.study]
-    names = names_below([*logs.files, *(one.file for one in problems), *(Path(run.file.path) for run in logs.begun)])
-    bad = (_by_problem(logs, one, names[one.file]) for one in problems)
+    if not problems and not logs.begun:
+        return ()
+    begun_files = [Path(run.file.path) for run in logs.begun]
+    root = folder_above([*logs.files, *(one.file for one in problems), *begun_files])
+    bad = (_by_problem(logs, one, name_below(one.file, root)) for one in problems)
+    names = (name_below(file, root).as_posix() for file in begun_files)
     begun = (
         LeftOut(
             experiment=run.file.experiment,
             participant=logs.person(run.file.study, run.file.participant),
             reason=f"the run has begun and is not finished: {run.far}",
             rule=FINISHED,
-            remedy=run.remedy.replace(run.file.path, names[Path(run.file.path)].as_posix()),
-            file=names[Path(run.file.path)].as_posix(),
+            remedy=run.remedy.replace(run.file.path, name),
+            file=name,
         )
-        for run in logs.begun
+        for run, name in zip(logs.begun, names, strict=True)
     )
     return (*bad, *begun)
 

@@ -128,9 +128,24 @@ def _real(path: Path) -> str:
 def names_below(files: Iterable[Path]) -> dict[Path, Path]:
     """Files by their path below the folder that holds them all: results say nothing of the machine they come from."""
     every = [*files]
-    folders = {file.absolute().parent for file in every}
-    root = Path(os.path.commonpath(folders)) if folders else Path()
-    return {file: file.absolute().relative_to(root) for file in every}
+    root = folder_above(every)
+    return {file: name_below(file, root) for file in every}
+
+
+def folder_above(files: Iterable[Path]) -> str:
+    """The folder that holds all of the files, empty if there are none."""
+    folders = {_whole(file).rpartition(os.sep)[0] for file in files}
+    return os.path.commonpath(folders) if folders else ""
+
+
+def name_below(file: Path, root: str) -> Path:
+    """A file's path below a folder above it."""
+    return Path(_whole(file)[len(root) :].lstrip(os.sep))
+
+
+def _whole(file: Path) -> str:
+    """A file's whole path, as text: of many thousands quicker than as paths."""
+    return str(file if file.is_absolute() else file.absolute())
 
 
 def below(problem: Problem, shown: Path) -> str:

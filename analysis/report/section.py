@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 from analysis.report.labels import cut_names
+
+_Item = TypeVar("_Item")
 
 LISTED = 100
 """A list longer than this is cut: a page of ten thousand rows is read by nobody, and opens slowly."""
@@ -83,12 +85,12 @@ def origin_table(facts: Mapping[str, object]) -> Table:
     return Table(caption="Where the numbers come from", header=("What", "Value"), rows=rows)
 
 
-def shortened(items: Sequence[str], noun: str) -> tuple[str, ...]:
-    """All `items`, or the first 50 of more than 100 and how many more there are.
+def shortened(items: Sequence[_Item], noun: str, shown: Callable[[_Item], str] = str) -> tuple[str, ...]:
+    """All `items` as they are `shown`, or the first 50 of more than 100 and how many more there are.
 
     >>> shortened(["a", "b"], "files"), shortened(["a"] * 10_000, "files")[-1]
     (('a', 'b'), 'and 9,950 more files')
     """
     if len(items) <= LISTED:
-        return tuple(items)
-    return (*items[:SHOWN], f"and {len(items) - SHOWN:,} more {noun}")
+        return tuple(map(shown, items))
+    return (*map(shown, items[:SHOWN]), f"and {len(items) - SHOWN:,} more {noun}")

@@ -34,9 +34,8 @@ def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[
     for experiment, table in logs.tables.items():
         whose = analysed.get(experiment)
         if whose is not None:
-            keys = table[_KEYS].astype(str)
-            mine = keys["participant_id"].isin(whose.participants.codes)
-            long = _scores(experiment, pd.concat([keys, table.drop(columns=_KEYS)], axis=1)[mine])
+            mine = table["participant_id"].isin(whose.participants.codes)
+            long = _scores(experiment, table[mine]).astype(dict.fromkeys(_KEYS, str))
             files[f"{experiment}_long.csv"] = _csv(long)
             files[f"{experiment}_wide.csv"] = _csv(_wide(long, whose.methods))
     return files | {f"{one.design.design}_long.csv": _csv(_of_design(one)) for one in logs.designs}
@@ -89,20 +88,20 @@ def _answers(trials: pd.DataFrame) -> pd.DataFrame:
     keyed = trials.assign(correct=trials["correct"].astype("float64"), own_time_s=own_s)
     found: dict[str, pd.Series] = {}
     for direction in ("forward", "backward"):
-        rows = keyed[keyed["direction"] == direction].groupby(_KEYS)["correct"]
+        rows = keyed[keyed["direction"] == direction].groupby(_KEYS, observed=True)["correct"]
         found |= {f"trials_{direction}": rows.size(), f"correct_{direction}": rows.sum()}
-    table = pd.DataFrame(found, index=keyed.groupby(_KEYS).size().index)
+    table = pd.DataFrame(found, index=keyed.groupby(_KEYS, observed=True).size().index)
     counts = table.fillna(0).astype("int64")
     for direction in ("forward", "backward"):
         trials_of = counts[f"trials_{direction}"]
         counts[f"rate_{direction}"] = counts[f"correct_{direction}"] / trials_of.where(trials_of > 0)
-    counts["response_time_median_s"] = keyed.groupby(_KEYS)["own_time_s"].median()
+    counts["response_time_median_s"] = keyed.groupby(_KEYS, observed=True)["own_time_s"].median()
     return counts.reset_index()
 
 
 def _ratings(ratings: pd.DataFrame) -> pd.DataFrame:
     """Rating and order of presentation."""
-    rows = ratings.groupby(_KEYS).agg(rating=("rating", "mean"), order=("trial", "min"))
+    rows = ratings.groupby(_KEYS, observed=True).agg(rating=("rating", "mean"), order=("trial", "min"))
     return rows.reset_index()
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 
 from analysis.logs.column_map import NOT_STATED
 from analysis.logs.exclusions import FINISHED, LeftOut
-from analysis.logs.files import below, names_below
+from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.report import apa
 from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table, shortened
 from analysis.summary.participation import PeopleOfExperiment
@@ -159,11 +158,15 @@ def left_out_lines(report: ReportData) -> tuple[str, ...]:
     What could not be read is told by its file.
     """
     people = [entry for entry in report.statistics.excluded if not entry.file or entry.rule == FINISHED]
-    folders = {file: name.parent for file, name in shown_names(report).items()}
+    root = shown_root(report) if report.problems or report.remarks else ""
+
+    def told(problem: Problem) -> str:
+        return below(problem, name_below(problem.file, root).parent)
+
     return (
         *(_rule_line(report, [*some]) for _, some in groupby(sorted(people, key=_rule), key=_rule)),
-        *(f"Left out: {below(problem, folders[problem.file])}." for problem in report.problems),
-        *(f"Used, but: {below(remark, folders[remark.file])}." for remark in report.remarks),
+        *(f"Left out: {told(problem)}." for problem in report.problems),
+        *(f"Used, but: {told(remark)}." for remark in report.remarks),
     )
 
 
@@ -181,9 +184,9 @@ def _rule_line(report: ReportData, entries: list[LeftOut]) -> str:
     return f"{_named(report, first.experiment)}: {count} left out: {', '.join(people)}.{rule}{remedy}"
 
 
-def shown_names(report: ReportData) -> Mapping[Path, Path]:
-    """What each file is called on the page: nothing of the machine."""
-    return names_below([*report.files, *(one.file for one in (*report.problems, *report.remarks))])
+def shown_root(report: ReportData) -> str:
+    """The folder below which files are named on the page: nothing of the machine."""
+    return folder_above([*report.files, *(one.file for one in (*report.problems, *report.remarks))])
 
 
 def notices(report: ReportData) -> Iterator[PageNotice]:

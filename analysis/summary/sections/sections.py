@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from analysis.logs.files import shown_name
+from analysis.logs.files import name_below, shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
@@ -18,7 +18,7 @@ from analysis.summary.sections.designs import sections_of_designs
 from analysis.summary.sections.experiments import direction_section, everybodys_values, preference_section
 from analysis.summary.sections.glance import glance_section
 from analysis.summary.sections.manuscript import manuscript_section
-from analysis.summary.sections.participants import all_left_out, notices, participants_section, shown_names
+from analysis.summary.sections.participants import all_left_out, notices, participants_section, shown_root
 from analysis.summary.sections.pictures import write_figures
 from analysis.summary.sections.preregistration import deviations_sections
 from analysis.summary.sections.published import odds_section, published_sections, shot_section
@@ -50,9 +50,9 @@ def _provenance(report: ReportData) -> Iterator[Section]:
 
 
 def _log_files(report: ReportData) -> Iterator[Section]:
-    names = shown_names(report)
     if report.files:
-        listed = shortened([shown_name(names[file].as_posix()) for file in report.files], "log files")
+        root = shown_root(report)
+        listed = shortened(report.files, "log files", lambda file: shown_name(name_below(file, root).as_posix()))
         yield Section(title="Log files", items=listed, appendix=True, folded=True)
 
 
