@@ -24,12 +24,13 @@ class Rendering:
     """What the model says of one shot: the motion's status (`rendered` for a vibration), and what it asks of the coil.
 
     `settle_s` are the seconds from the onset of the pulse until the next shot may start: when the magnet is back at its
-    stop, and never before the end of the pulse; for a vibration its duration.
+    stop, and never before the end of the pulse; for a vibration its duration. `peak_force_N`: `None` of a vibration.
     """
 
     motion: str
     settle_s: float
     load: Load
+    peak_force_N: float | None = None
 
 
 def paper_methods(gun: GunParameters = _PAPER_GUN) -> dict[str, Method]:
@@ -64,7 +65,7 @@ def rendering_of(method: Method, drive: Drive | None = None) -> Rendering:
     raise LimitError(f"drive is {drive}; this method is driven by {wanted}")
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=4096)
 def _shot(gun: GunParameters) -> Rendering:
     from device.physics import simulate  # noqa: PLC0415 - the heavy import waits until the physics is used
 
@@ -75,4 +76,9 @@ def _shot(gun: GunParameters) -> Rendering:
             f"does not come home ({summary.status}), so no shot could follow; lower the friction or change the pulse"
         )
     load = load_of(Pulse(voltage_V=gun.voltage_V, pulse_s=gun.pulse_s), gun.resistance_ohm)
-    return Rendering(motion=summary.status, settle_s=max(summary.reset_end_s or 0.0, gun.pulse_s), load=load)
+    return Rendering(
+        motion=summary.status,
+        settle_s=max(summary.reset_end_s or 0.0, gun.pulse_s),
+        load=load,
+        peak_force_N=summary.peak_force_N,
+    )

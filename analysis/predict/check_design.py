@@ -13,8 +13,6 @@ from analysis.report.section import Section, Table
 from analysis.report.serial import OPTIONAL, written
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
 from device.methods import Method
-from device.parameters import GunParameters
-from device.physics import simulate
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
@@ -171,8 +169,6 @@ def _order(design: DesignConfig, plan: Plan) -> tuple[str, ...]:
 
 def _cell(setup: Setup[DesignConfig], one: ConditionLimits) -> CellCheck:
     drive = one.drive
-    parameters = stimulus(setup.config, setup.gun, one.levels).parameters
-    pulse = isinstance(drive, Pulse)
     return CellCheck(
         levels=dict(one.levels),
         settings=dict(settings(setup.config, setup.gun, one.levels)),
@@ -181,7 +177,7 @@ def _cell(setup: Setup[DesignConfig], one: ConditionLimits) -> CellCheck:
         voltage_V=drive.voltage_V if isinstance(drive, Pulse) else None,
         pulse_s=drive.pulse_s if isinstance(drive, Pulse) else None,
         effect=None if isinstance(drive, Pulse) else drive.effect,
-        peak_force_N=simulate(parameters).peak_force_N if pulse and isinstance(parameters, GunParameters) else None,
+        peak_force_N=one.peak_force_N,
     )
 
 

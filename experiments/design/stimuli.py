@@ -50,13 +50,17 @@ class IntervalStimulus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionLimits:
-    """What a shot of a cell asks of the gun; `status` is the model's: `home`, `no-break-away`, or `rendered`."""
+    """What a shot of a cell asks of the gun; `status` is the model's: `home`, `no-break-away`, or `rendered`.
+
+    `peak_force_N`: on the hand, by the model; `None` of a vibration.
+    """
 
     levels: Condition
     drive: Drive
     load: Load
     status: str
     settle_s: float
+    peak_force_N: float | None
 
 
 def damper(gun: GunConfig, method: str) -> tuple[tuple[str, str], ...]:
@@ -261,7 +265,12 @@ def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> Condi
             "you study, write `below_break_away = true` on top of the design's file, above its first [table]",
         )
     return ConditionLimits(
-        levels=levels, drive=shot.drive, load=rendering.load, status=rendering.motion, settle_s=rendering.settle_s
+        levels=levels,
+        drive=shot.drive,
+        load=rendering.load,
+        status=rendering.motion,
+        settle_s=rendering.settle_s,
+        peak_force_N=rendering.peak_force_N,
     )
 
 
