@@ -125,6 +125,14 @@ def test_tracks_come_to_their_target(rule: UpDown | Kesten) -> None:
     assert np.mean(found.levels[200:]) == pytest.approx(norm.ppf(rule.target), abs=0.15)
 
 
+def test_shrinking_steps_come_to_their_target_on_a_coarse_grid_too() -> None:
+    """Rounded off step by step, the smaller steps would be lost, and tracks would only go up, here to 2.7."""
+    within, stop = LevelRange(low=-5.0, high=5.0, grain=0.5), TrackEnd(trials=200)
+    rule, draws = Kesten(start=3.0, first_step=4.0, target=0.75, within=within, stop=stop), np.random.default_rng(18)
+    last = [track_of(rule, lambda level: bool(draws.random() < ndtr(level))).levels[-1] for _ in range(60)]
+    assert np.mean(last) == pytest.approx(norm.ppf(0.75), abs=0.25)
+
+
 @given(up_downs(), some_answers)
 def test_a_track_of_somebody_is_that_of_their_answers(rule: UpDown, answers: list[bool]) -> None:
     """Somebody who answers so, trial by trial: the same track, and asked no oftener than it goes on."""
@@ -140,6 +148,30 @@ def test_a_track_of_somebody_is_that_of_their_answers(rule: UpDown, answers: lis
 
 
 # the posterior
+
+
+def test_a_lapse_goes_either_way_where_it_is_said_so() -> None:
+    known = posterior.parameter_grid(
+        stimuli=np.array([-99.0, 99.0]),
+        thresholds=np.zeros(1),
+        widths=np.ones(1),
+        lapses=np.array([0.0, 0.04]),
+        guesses=np.zeros(1),
+        either_way=True,
+    )
+    shares = known.chance + known.slack * known.felt[..., None]
+    assert shares[:, 0].tolist() == [[0.0, 0.04], [1.0, 0.96]]
+
+
+@given(some.integers(0, 40), some.booleans())
+def test_an_interval_is_as_wide_as_its_cells(place: int, log: bool) -> None:
+    """Of one value that is certain 95 % of its cell; of all alike 95 % of the range of the cells."""
+    values = np.linspace(1.0, 3.0, 41)
+    one = float(posterior.credible_span(values, np.eye(41)[place], log=log))
+    ends = values[place] + np.array([-0.475, 0.475]) * 0.05
+    assert one == pytest.approx(float(np.ptp(np.exp(ends) if log else ends)))
+    assert float(posterior.credible_span(values, np.ones(41))) == pytest.approx(0.95 * 2.05)
+
 
 KNOWN = posterior.parameter_grid(
     stimuli=np.linspace(-4, 4, 9),

@@ -92,7 +92,8 @@ class UpDown:
 class Kesten:
     """Steps that shrink with each change of direction: x - c (right - target) / (2 + changes) from the third trial on.
 
-    The first two steps are c (right - target) / n. `first_step` is c (Treutwein 1995, equation 12).
+    The first two steps are c (right - target) / n. `first_step` is c (Treutwein 1995, equation 12). On a grid the level
+    nearest to x is taken, while x goes on by steps of any size: rounded off, the smaller one of the two would be lost.
     """
 
     start: float
@@ -150,7 +151,7 @@ def track_of(rule: UpDown | Kesten, answer: Callable[[float], bool | None]) -> T
             break
         walk.levels.append(walk.level)
         step = walk.up_down(rule, right=right) if isinstance(rule, UpDown) else walk.kesten(rule, right=right)
-        walk.go(rule.within, step)
+        walk.go(rule, step)
     return TrackState(
         next_level=None if over else walk.level,
         levels=tuple(walk.levels),
@@ -164,6 +165,7 @@ class _Walk:
 
     def __init__(self, level: float) -> None:
         self.level, self.at_edge = level, False
+        self._exact = level
         self.levels: list[float] = []
         self.reversals: list[float] = []
         self._right = self._wrong = 0
@@ -195,12 +197,13 @@ class _Walk:
             self.reversals.append(self.level)
         self._heading = heading
 
-    def go(self, within: LevelRange, taken: tuple[int, float]) -> None:
+    def go(self, rule: UpDown | Kesten, taken: tuple[int, float]) -> None:
         """Take a step, as far as the range lets it."""
-        heading, step = taken
-        wanted = within.moved(self.level, step) if heading else self.level
+        (heading, step), within = taken, rule.within
+        wanted = within.moved(self._exact, step) if heading else self._exact
         self.at_edge = not within.low <= wanted <= within.high
         self.level = within.kept(wanted)
+        self._exact = self.level if isinstance(rule, UpDown) else min(max(wanted, within.low), within.high)
 
 
 def _harder_first(right: float, down: int, up: int) -> float:
