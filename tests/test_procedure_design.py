@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from collections import Counter
 from typing import Any
 
@@ -11,7 +13,10 @@ from analysis.predict.check_design import check_design
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of, practice_of
-from experiments.load import load_setup
+from experiments.design.procedures.choosing import posterior_rule
+from experiments.design.procedures.config import PosteriorConfig
+from experiments.design.procedures.in_words import rule_words
+from experiments.load import load_setup, shipped_folder
 from experiments.screens import texts
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
@@ -21,7 +26,15 @@ from tests.driven_designs import done
 
 THRESHOLD, STAIRCASE = load_setup("threshold"), load_setup("staircase")
 ONE, OTHER = THRESHOLD.config.model_dump(mode="json"), STAIRCASE.config.model_dump(mode="json")
+SHRINKING = {"kind": "kesten", "target": 0.75, **dict.fromkeys(("up", "down", "steps", "ratio"))}
 TWO = {"of": ["voltage_V", "pulse_s"], "rule": "entropy"}
+
+
+def two_factors(**procedure: Any) -> dict[str, Any]:
+    """What makes the shipped threshold one of a voltage and a pulse together."""
+    few = {"threshold": {"points": 9}, "width": {"points": 3}, "rise": {"minimum": -1.5, "maximum": -0.5, "points": 3}}
+    levels = {"minimum": 0.004, "maximum": 0.01, "grain": 0.001}
+    return {"factors": {"pulse_s": {"levels": levels}}, "procedure": {**TWO, "scale": "log", **few, **procedure}}
 
 
 def said(tables: dict[str, Any], changes: dict[str, Any]) -> str:
@@ -41,17 +54,36 @@ REFUSED = [
     (ONE, {"factors": {"posture": {"levels": [1.0, 2.0]}}, "procedure": {"of": ["posture"]}}, "posture is set by hand"),
     (OTHER, {"procedure": {"steps": [0.0]}}, "procedure.steps.0 = 0.0: must be above 0"),
     (OTHER, {"procedure": {"steps": [1e-5]}}, "1e-05 does not leave the level 0.001 of pulse_s (grain 0.00025)"),
-    (OTHER, {"procedure": {"starts": [0.0011]}}, "the start 0.0011 is none of the levels of pulse_s, 0.001 to 0.01"),
+    (
+        OTHER,
+        {"procedure": {"starts": [0.0011]}},
+        "procedure.starts: 0.0011 is none of the levels of pulse_s, 0.001 to 0.01",
+    ),
     (OTHER, {"procedure": {"down": 1}}, "the rule settles where 0.5 are right, and who feels nothing is right in 0.5"),
     (OTHER, {"procedure": {"reversals": 40}}, "reversals = 40 takes 81 trials or more, and trials = 50 end a track"),
     (OTHER, {"procedure": {"trials": None}}, "procedure.trials: is missing"),
     (OTHER, {"procedure": {"least_trials": 60}}, "least_trials = 60 is more than trials = 50"),
     (OTHER, {"factors": {"pulse_s": {"levels": [0.002, 0.006, 0.008]}}}, "need them at even distances"),
     (ONE, {"procedure": {"start": 3.0}}, "start = 3 is excluded by the prior of the threshold, 4 to 20"),
-    (ONE, {"procedure": {"threshold": {"mean": 30.0, "sd": 2.0}}}, "mean 30 is outside of 4 to 20"),
-    (ONE, {"procedure": {"threshold": {"mean": 10.1, "sd": 1e-9}}}, "values is near enough to mean 10.1"),
+    (ONE, {"procedure": {"threshold": {"mean": 30.0, "sd": 2.0}}}, "mean = 30 is outside of 4 to 20"),
+    (ONE, {"procedure": {"threshold": {"mean": 10.1, "sd": 1e-9}}}, "less than half the distance of the values, 0.25"),
+    (ONE, {"procedure": {"threshold": {"minimum": 20.0, "maximum": 4.0}}}, "threshold.minimum = 20 is above maximum"),
+    (ONE, {"procedure": {"threshold": {"points": 1}}}, "threshold.points = 1 is one value, which has minimum"),
+    (ONE, {"procedure": {"threshold": {"maximum": 2e8}}}, "has one value only among the levels of voltage_V, 4 to 20"),
+    (ONE, {"procedure": {"width": {"minimum": 1e-300}}}, "procedure.width.minimum = 1e-300 is less than a 100th of"),
+    (ONE, {"procedure": {"width": {"maximum": 1e300}}}, "procedure.width.maximum = 1e+300 is more than 100 times the"),
+    (ONE, {"procedure": {"credible_width": 16.0}}, "procedure.credible_width = 16: the interval of the prior is 15.44"),
+    (ONE, {"procedure": {"credible_width": 1e-9}}, "too far apart for an interval narrower than 0.2375"),
+    (ONE, {"procedure": {"lapse_either_way": True}}, "procedure.lapse_either_way: of 0.5 right by chance"),
+    (OTHER, {"procedure": {"steps": [0.01]}}, "procedure.steps: 0.01 goes through all of pulse_s, 0.001 to 0.01"),
+    (OTHER, {"procedure": {"ratio": 1e5}}, "procedure.ratio = 100000: a step up of 0.001 goes through all"),
+    (OTHER, {"procedure": {"ratio": 1e5, "steps": [2.0], "step_as": "factor"}}, "procedure.ratio = 100000: a step up"),
+    (OTHER, {"procedure": {**SHRINKING, "first_step": 1e-5}}, "first_step = 1e-05 is smaller than the grain"),
+    (OTHER, {"procedure": {**SHRINKING, "first_step": 5.0}}, "first_step = 5 goes through all of pulse_s"),
+    (OTHER, {"procedure": {**SHRINKING, "first_step": 5.0, "step_as": "factor"}}, "first_step = 5 goes through all of"),
+    (OTHER, {"factors": {"pulse_s": {"levels": {"minimum": 0.02}}}}, "minimum = 0.02 is not below maximum = 0.01"),
     (ONE, {"procedure": {"threshold": {"minimum": 21.0, "maximum": 25.0}}}, "21 to 25, holds none of the levels"),
-    (ONE, {"procedure": {"width": {"minimum": 0.0}}}, "minimum 0 must be above 0"),
+    (ONE, {"procedure": {"width": {"minimum": 0.0}}}, "width.minimum = 0 must be above 0"),
     (ONE, {"procedure": {"lapse": {"minimum": 0.0, "maximum": 0.6, "points": 3}}}, "leave nothing to feel"),
     (ONE, {"procedure": {"guess": {"minimum": 0.0, "maximum": 0.1, "points": 2}}}, "who feels nothing is right in 0.5"),
     (ONE, {"questions": {"response": {"correct": None}}}, "no answer is a success (response)"),
@@ -60,8 +92,14 @@ REFUSED = [
     (ONE, {"procedure": {"kind": "psi"}}, "kind = 'psi' is none of constant, up-down, kesten, posterior"),
     (ONE, {"order": {"repetitions": 2}}, "order.repetitions is of constant stimuli"),
     (ONE, {"order": {"session": ["voltage_V"]}}, "voltage_V must vary from trial to trial"),
-    (ONE, {"procedure": {"of": ["voltage_V", "method"]}}, "two factors take the rule entropy"),
+    (
+        ONE,
+        {"procedure": {"of": ["voltage_V", "method"]}},
+        "rule = 'variance' is of one factor, not of voltage_V and method",
+    ),
     (ONE, {"procedure": {**TWO}}, "rise is missing"),
+    (ONE, two_factors(threshold={"minimum": 40.0, "maximum": 200.0, "points": 9}), "holds none of the levels of"),
+    (ONE, two_factors(rise={"minimum": -1e5, "maximum": -1e4, "points": 3}), "holds none of the levels of voltage_V"),
     (
         OTHER,
         {"factors": {"voltage_V": {"levels": [6.0, 8.0]}}, "procedure": {"of": ["pulse_s", "voltage_V"]}},
@@ -75,6 +113,37 @@ REFUSED = [
 @pytest.mark.parametrize(("tables", "changes", "words"), REFUSED, ids=[words[:40] for _, _, words in REFUSED])
 def test_what_cannot_be_is_refused_by_name(tables: dict[str, Any], changes: dict[str, Any], words: str) -> None:
     assert words in said(tables, changes)
+
+
+def test_two_factors_whose_prior_agrees_with_the_levels_are_taken() -> None:
+    assert checked_table(DesignConfig, _bare(merged(ONE, two_factors())), "f.toml").adapted == ("voltage_V", "pulse_s")
+
+
+def test_lapses_of_yes_and_no_go_either_way_where_the_design_says_so() -> None:
+    yes = {"kind": "yes-no", "text": "Felt?"}
+    changes = {"questions": {"felt": yes, "response": None}, "procedure": {"lapse_either_way": True}}
+    design = checked_table(DesignConfig, _bare(merged(ONE, changes)), "f.toml")
+    table = design.adaptive
+    assert isinstance(table, PosteriorConfig)
+    known = posterior_rule(table, [(4.0, 20.0)], 0.0).grid
+    assert known.chance.tolist() == table.lapse.values.tolist()
+    assert "lapse rate 0 to 0.08, lapses either way)" in rule_words(table, [(4.0, 20.0)])
+
+
+def test_a_message_about_a_key_of_the_procedure_has_that_key_and_its_line() -> None:
+    text = (shipped_folder() / "staircase.toml").read_text()
+    for key, wrong in {"reversals": "45", "trials": "3"}.items():
+        bad = re.sub(rf"(?m)^{key} = \d+", f"{key} = {wrong}", text)
+        line = next(at for at, one in enumerate(bad.splitlines(), start=1) if one.startswith("reversals"))
+        with pytest.raises(ConfigError, match=rf"^f.toml:{line}: procedure\.reversals = "):
+            checked_table(DesignConfig, tomllib.loads(bad), "f.toml", bad)
+
+
+def test_a_list_of_wrong_elements_is_not_said_to_be_too_short() -> None:
+    assert said(OTHER, {"procedure": {"steps": ["a", -1.0]}}).splitlines() == [
+        "f.toml: procedure.steps.0 = 'a': must be a number",
+        "f.toml: procedure.steps.1 = -1.0: must be above 0",
+    ]
 
 
 def test_a_grid_beyond_the_gun_is_refused_with_its_limit() -> None:

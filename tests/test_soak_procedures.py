@@ -69,15 +69,15 @@ TASKS = pytest.mark.parametrize("task", [FORCED, YES_NO], ids=["2AFC", "yes-no"]
 
 def grid_of(task: Task, sds: tuple[float, float] = VAGUE) -> ParameterGrid:
     """60 thresholds within ± 8, 20 sds; high lapse rates are less likely. A lapse may go either way: then g is l."""
-    known = parameter_grid(
+    return parameter_grid(
         stimuli=LEVELS,
         thresholds=np.linspace(-8, 8, 60),
         widths=width_of(1.0) * np.geomspace(*sds, 20),
         lapses=LAPSES,
-        guesses=np.array([task.guess]),
+        guesses=np.array([0.0 if task is EITHER_WAY else task.guess]),
         prior=np.ones((60, 20, LAPSES.size, 1)) * np.exp(-LAPSES / 0.03)[:, None],
+        either_way=task is EITHER_WAY,
     )
-    return replace(known, chance=LAPSES, slack=1 - 2 * LAPSES) if task is EITHER_WAY else known
 
 
 def efficiency(task: Task, errors: np.ndarray) -> tuple[str, float, float]:

@@ -45,7 +45,7 @@ def validation_text(
             finding["ctx"] = {"rule": f"{_UNKNOWN}; known are {', '.join(known)}" if known else _UNKNOWN}
         found.setdefault(_place(finding, table), []).append(finding)
     inner = {place[:length] for place in found for length in range(len(place))}
-    said = [(place, findings) for place, findings in found.items() if not (_all_of_kind(findings) and place in inner)]
+    said = [(place, findings) for place, findings in found.items() if not (place in inner and _follows(findings))]
     lines = [_finding(place, findings, source, text) for place, findings in _few(said)]
     return "\n".join([*lines, *_more(len(said) - len(lines), error.error_count() - _MOST_FINDINGS)])
 
@@ -106,6 +106,11 @@ def _all_of_kind(findings: Sequence[Any]) -> bool:
     return all(finding["type"].endswith("_type") for finding in findings)
 
 
+def _follows(findings: Sequence[Any]) -> bool:
+    """Whether a table or list was refused for what is inside alone: of another kind, or empty without what is wrong."""
+    return _all_of_kind(findings) or all(finding["type"] == "too_short" for finding in findings)
+
+
 def _place(finding: Any, table: dict[str, Any]) -> tuple[str, ...]:
     """The keys of a finding as they stand in the file, without the names of the kinds that were tried."""
     keys: list[str] = []
@@ -135,9 +140,11 @@ def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str
     shown = f" = {_shortened(value)}" if place and isinstance(value, str | int | float) else ""
     said = dict.fromkeys(_RULES_BY_TYPE.get(one["type"], _own_words)(one) for one in findings)
     rule = " or ".join(said) if len(said) > 1 else next(iter(said))
-    line = line_of(text, [*place] or keys_in(rule))
+    inner = keys_in(rule)
+    own = isinstance(value, dict) and bool(inner) and inner[0] in value
+    line = line_of(text, [*place, *(inner if own or not place else ())])
     key = ".".join(part if len(part) <= _LINE else _shortened(part) for part in place)
-    return f"{source}{f':{line}' if line else ''}: {key}{shown}{': ' if place else ''}{rule}"
+    return f"{source}{f':{line}' if line else ''}: {key}{shown}{('.' if own else ': ') if place else ''}{rule}"
 
 
 def _own_words(finding: Any) -> str:

@@ -71,11 +71,13 @@ class EvenLevels(Model):
 
     @model_validator(mode="after")
     def _grain_divides(self) -> Self:
+        if self.minimum >= self.maximum:
+            raise ValueError(f"minimum = {self.minimum:g} is not below maximum = {self.maximum:g}; change one of them")
         steps = (self.maximum - self.minimum) / self.grain
         if not 1 - _OFF <= steps < MAX_LEVELS - 0.5:
             raise ValueError(
                 f"minimum {self.minimum:g}, maximum {self.maximum:g} and grain {self.grain:g} make "
-                f"{math.floor(max(steps, -1) + _OFF) + 1} levels; they must make 2 to {MAX_LEVELS}"
+                f"{math.floor(steps + _OFF) + 1:,} levels; they must make 2 to {MAX_LEVELS}"
             )
         if abs(steps - round(steps)) > _OFF * steps:
             near = self.minimum + math.floor(steps) * self.grain

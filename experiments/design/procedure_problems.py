@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+from math import log, log2
+
+import numpy as np
 
 from experiments.design.language import (
     DRIVEN,
@@ -20,11 +23,17 @@ from experiments.design.procedures.config import (
     UpDownConfig,
     starts_of,
 )
+from experiments.design.procedures.psychometric import Shares
+from experiments.design.procedures.surface import threshold_along
 from experiments.design.procedures.up_down import UpDown
 from experiments.design.procedures.walks import NumericLevels, are_even, level_range, walk_rule
 
 _LARGEST_GRID = 6_000_000
 """Stimuli times places of the parameters' grid: so much is gone through in 20 ms (measured)."""
+_LEAST_AMONG = 0.001
+"""Of a prior so much at least lies among the levels."""
+_MUCH, _ROUNDED = 100, 1e-9
+"""Widths so many times smaller than the distance of levels, or larger than their range, no answer tells apart."""
 
 
 def success_of(questions: Mapping[str, QuestionConfig], named: str | None) -> str | None:
@@ -134,8 +143,9 @@ def _start_problems(table: AdaptiveConfig, levels: NumericLevels) -> Iterator[st
         if start is not None and start not in levels:
             near = sorted(levels, key=lambda level: abs(level - start))[:2]
             shown = " or ".join(map(shown_level, sorted(near)))
+            key = "start" if isinstance(table, PosteriorConfig) else "starts"
             yield (
-                f"procedure: the start {start:g} is none of the levels of {table.of[0]}, {levels[0]:g} to "
+                f"procedure.{key}: {start:g} is none of the levels of {table.of[0]}, {levels[0]:g} to "
                 f"{levels[-1]:g}; nearest: {shown}"
             )
 
@@ -155,18 +165,48 @@ def _walk_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels, gu
     if not are_even(levels):
         yield f"factors.{name}.levels: steps up and down need them at even distances; give minimum, maximum and grain"
         return
+    yield from [*_size_problems(table, levels)] or _settling_problems(table, levels, guess)
+
+
+def _settling_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels, guess: float) -> Iterator[str]:
+    """A rule that settles where who feels nothing is right as often, and steps that get nowhere."""
     rule = walk_rule(table, levels, levels[0])
-    if rule.target <= guess:
+    if rule.target <= guess and isinstance(rule, UpDown):
+        key = f"down = {rule.down}" if rule.ratio == 1 else f"ratio = {rule.ratio:g}"
         yield (
-            f"procedure: the rule settles where {rule.target:.3g} are right, and who feels nothing is right in "
+            f"procedure.{key}: the rule settles where {rule.target:.3g} are right, and who feels nothing is right in "
             f"{guess:.3g}: it would never settle; more right answers in a row (down), or a larger ratio"
-            if isinstance(rule, UpDown)
-            else f"procedure.target = {rule.target:g} is not above {guess:.3g}, which who feels nothing reaches"
         )
-    if table.step_as == "factor" and levels[0] <= 0:
-        yield f"procedure.step_as = 'factor': {name} has the level {levels[0]:g}; factors need levels above 0"
-    elif isinstance(table, UpDownConfig):
+    elif rule.target <= guess:
+        yield f"procedure.target = {rule.target:g} is not above {guess:.3g}, which who feels nothing reaches"
+    if isinstance(table, UpDownConfig):
         yield from _step_problems(table, levels)
+
+
+def _size_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels) -> Iterator[str]:
+    """Steps that lead to an end from everywhere, and such as never leave a level; of factors, their logarithms."""
+    low, high, grain = levels[0], levels[-1], levels[1] - levels[0]
+    factors = table.step_as == "factor"
+    if factors and low <= 0:
+        yield f"procedure.step_as = 'factor': {table.of[0]} has the level {low:g}; factors need levels above 0"
+        return
+    where = f"all of {table.of[0]}, {low:g} to {high:g}"
+    if isinstance(table, KestenConfig):
+        size, widest = table.first_step, log2(high / low) if factors else high - low
+        if size * max(table.target, 1 - table.target) > widest:
+            yield f"procedure.first_step = {size:g} goes through {where}, in the first step; make it smaller"
+        if size < (log2(high / (high - grain)) if factors else (1 - _ROUNDED) * grain):
+            yield (
+                f"procedure.first_step = {size:g} is smaller than the grain of {table.of[0]}, {grain:.4g}, and steps "
+                "only shrink; make it several times as large"
+            )
+        return
+    size, widest = max(table.steps), log(high / low) if factors else high - low
+    step = log(size) if factors else size
+    if step > (1 + _ROUNDED) * widest:
+        yield f"procedure.steps: {size:g} goes through {where}, in one step; make it smaller"
+    elif step * table.ratio > (1 + _ROUNDED) * widest:
+        yield f"procedure.ratio = {table.ratio:g}: a step up of {size:g} goes through {where}; make it smaller"
 
 
 def _step_problems(table: UpDownConfig, levels: NumericLevels) -> Iterator[str]:
@@ -186,15 +226,10 @@ def _step_problems(table: UpDownConfig, levels: NumericLevels) -> Iterator[str]:
 
 def _posterior_problems(table: PosteriorConfig, levels: Sequence[NumericLevels], guess: float) -> Iterator[str]:
     first, name = levels[0], table.of[0]
-    if table.scale == "log" and min(one[0] for one in levels) <= 0:
-        yield f"procedure.scale = 'log': levels must be above 0; {name} begins at {first[0]:g}"
-    if len(table.of) == 1 and (table.threshold.maximum < first[0] or table.threshold.minimum > first[-1]):
-        yield (
-            f"procedure.threshold: the prior, {table.threshold.minimum:g} to {table.threshold.maximum:g}, holds none "
-            f"of the levels of {name}, {first[0]:g} to {first[-1]:g}"
-        )
     if table.guess is not None and guess:
         yield f"procedure.guess: who feels nothing is right in {guess:.3g} here, by the design; remove the table"
+    if table.lapse_either_way and guess:
+        yield f"procedure.lapse_either_way: of {guess:.3g} right by chance lapses go either way anyway; remove the key"
     if guess + table.lapse.maximum >= 1:
         yield f"procedure.lapse.maximum = {table.lapse.maximum:g} and the guess rate {guess:.3g} leave nothing to feel"
     places, parts = 1, (table.threshold, table.width, table.lapse, table.guess, table.rise, table.floor)
@@ -204,4 +239,60 @@ def _posterior_problems(table: PosteriorConfig, levels: Sequence[NumericLevels],
         yield (
             f"procedure: {places:,} stimuli times values of the parameters are more than {_LARGEST_GRID:,}, which can "
             "be gone through between two trials; take fewer points or levels"
+        )
+    elif table.scale == "log" and min(one[0] for one in levels) <= 0:
+        yield f"procedure.scale = 'log': levels must be above 0; {name} begins at {first[0]:g}"
+    else:
+        yield from _threshold_problems(table, levels)
+        yield from _width_problems(table, first)
+
+
+def _threshold_problems(table: PosteriorConfig, levels: Sequence[NumericLevels]) -> Iterator[str]:
+    """A prior is held against the levels: of two factors at two levels of the second at least."""
+    first, name, prior = levels[0], table.of[0], table.threshold
+    thresholds, weights = _thresholds(table, levels)
+    low, high = (x - 1e-9 * sign for sign, x in ((1, first[0]), (-1, first[-1])))
+    if table.scale == "log":
+        low, high = log(low), log(high)
+    among = ((thresholds >= low) & (thresholds <= high)).sum(axis=-1) >= len(table.of)
+    share = float((weights * among).sum() / weights.sum())
+    shown = f"the prior, {prior.minimum:g} to {prior.maximum:g},"
+    if len(table.of) == 2:
+        shown += f" with rise and floor, at two levels of {table.of[1]}"
+    if share < _LEAST_AMONG:
+        yield f"procedure.threshold: {shown} holds none of the levels of {name}, {first[0]:g} to {first[-1]:g}"
+    elif among.sum() < min(2, among.size):
+        yield (
+            f"procedure.threshold: {shown} has one value only among the levels of {name}, {first[0]:g} to "
+            f"{first[-1]:g}; give it more points there"
+        )
+
+
+def _thresholds(table: PosteriorConfig, levels: Sequence[NumericLevels]) -> tuple[Shares, Shares]:
+    """The thresholds of the prior (places, levels of the second factor, or 1), and the places' weights."""
+    values = table.scaled(table.threshold)
+    if table.rise is None:
+        return values[:, None], table.threshold.weights
+    other = np.log(levels[1]) if table.scale == "log" else np.asarray(levels[1], float)
+    floors = np.array([-np.inf]) if table.floor is None else table.scaled(table.floor)
+    floor_weights = np.ones(1) if table.floor is None else table.floor.weights
+    held = threshold_along(
+        other - other.mean(), values[:, None, None, None], table.rise.values[:, None, None], floors[:, None]
+    )
+    weights = table.threshold.weights[:, None, None] * table.rise.weights[:, None] * floor_weights
+    return held.reshape(-1, len(other)), weights.ravel()
+
+
+def _width_problems(table: PosteriorConfig, levels: NumericLevels) -> Iterator[str]:
+    x = np.log(levels) if table.scale == "log" else np.asarray(levels, float)
+    apart, span, name = float(np.diff(x).min()), float(x[-1] - x[0]), table.of[0]
+    if table.width.minimum < apart / _MUCH:
+        yield (
+            f"procedure.width.minimum = {table.width.minimum:g} is less than a {_MUCH}th of the distance of levels of "
+            f"{name}, {apart:.4g}: no answers tell that from a step; make it larger"
+        )
+    if table.width.maximum > _MUCH * span:
+        yield (
+            f"procedure.width.maximum = {table.width.maximum:g} is more than {_MUCH} times the range of {name}, "
+            f"{span:.4g}: no answers tell that from chance; make it smaller"
         )

@@ -24,6 +24,7 @@ from experiments.design.procedures.posterior import (
     VarianceRule,
     WantedParameter,
     best_stimulus,
+    credible_span,
     entropy_rule,
     parameter_grid,
     posterior_after,
@@ -39,7 +40,6 @@ _WANTED: Mapping[str, tuple[WantedParameter, ...]] = {
     "width": ("width",),
     "both": ("threshold", "width"),
 }
-_TAILS = (0.025, 0.975)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,8 +106,9 @@ class PosteriorRule:
 
     def credible_width(self, posterior: Shares) -> float:
         """How wide the 95 % credible interval of the threshold is, in the factor's unit."""
-        low, high = self.grid.quantiles(posterior, next(iter(self.grid.axes)), _TAILS)
-        return float(np.exp(high) - np.exp(low) if self.table.scale == "log" else high - low)
+        name = next(iter(self.grid.axes))
+        weights = self.grid.marginal(posterior, name)
+        return float(credible_span(self.grid.axes[name], weights, log=self.table.scale == "log"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,30 +181,31 @@ def _grid(table: PosteriorConfig, stimuli: Sequence[NumericLevels], guess: float
     """
     x = np.array(stimuli) if table.scale == "linear" else np.log(stimuli)
     guesses = table.guess or PriorConfig(minimum=guess, maximum=guess, points=1)
-    rates = {"lapses": table.lapse.values, "guesses": guesses.values}
     after = (table.width.weights, table.lapse.weights, guesses.weights)
     if table.rise is None:
-        prior = _outer(table.threshold.weights, *after)
-        thresholds, widths = _scaled(table, table.threshold), table.width.values
         return parameter_grid(
-            stimuli=x[:, 0], thresholds=thresholds, widths=widths, prior=prior, shape=table.shape, **rates
+            stimuli=x[:, 0],
+            thresholds=table.scaled(table.threshold),
+            widths=table.width.values,
+            lapses=table.lapse.values,
+            guesses=guesses.values,
+            prior=_outer(table.threshold.weights, *after),
+            shape=table.shape,
+            either_way=table.lapse_either_way,
         )
     floor_weights = np.ones(1) if table.floor is None else table.floor.weights
     return surface_grid(
         stimuli=np.column_stack([x[:, 0], x[:, 1] - x[:, 1].mean()]),
-        intercepts=_scaled(table, table.threshold),
+        intercepts=table.scaled(table.threshold),
         rises=table.rise.values,
-        floors=np.array([-np.inf]) if table.floor is None else _scaled(table, table.floor),
+        floors=np.array([-np.inf]) if table.floor is None else table.scaled(table.floor),
         widths=table.width.values,
+        lapses=table.lapse.values,
+        guesses=guesses.values,
         prior=_outer(table.threshold.weights, table.rise.weights, floor_weights, *after),
         shape=table.shape,
-        **rates,
+        either_way=table.lapse_either_way,
     )
-
-
-def _scaled(table: PosteriorConfig, prior: PriorConfig) -> Shares:
-    """The values of a level, as the function takes them."""
-    return prior.values if table.scale == "linear" else np.asarray(np.log(prior.values))
 
 
 def _outer(*weights: Shares) -> Shares:

@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from experiments.config.door import InnerShare, Model, once
 from experiments.design.language import ColumnName
+from experiments.design.procedures.posterior import credible_span
 from experiments.design.procedures.psychometric import Shape, Shares
 
 MAX_TRACK = 1_000
@@ -130,24 +131,34 @@ class PriorConfig(Model):
         if self.mean is None or self.sd is None:
             return np.ones(self.points)
         off = np.log(self.values / self.mean) if self.spacing == "log" else self.values - self.mean
-        with np.errstate(over="ignore"):  # an sd of next to nothing: only the mean itself is likely
-            return np.asarray(np.exp(-0.5 * (off / self.sd) ** 2))
+        return np.asarray(np.exp(-0.5 * (off / self.sd) ** 2))
 
 
 def _prior_problems(prior: PriorConfig) -> Iterator[str]:
     low, high = prior.minimum, prior.maximum
+    if low > high:
+        yield f"minimum = {low:g} is above maximum = {high:g}; exchange them"
     if prior.points == 1 and low != high:
-        yield f"points = 1: one value has minimum = maximum, not {low:g} and {high:g}"
-    if prior.points > 1 and not low < high:
-        yield f"minimum {low:g} and maximum {high:g}: need minimum < maximum, or points = 1"
+        yield f"points = 1 is one value, which has minimum = maximum, not {low:g} and {high:g}"
+    if prior.points > 1 and low == high:
+        yield f"points = {prior.points}, but minimum = maximum = {low:g} is one value; write points = 1"
     if prior.spacing == "log" and low <= 0:
-        yield f'spacing = "log": minimum {low:g} must be above 0'
+        yield f'minimum = {low:g} must be above 0 where spacing = "log"'
     if (prior.mean is None) != (prior.sd is None):
         yield "mean and sd go together; give both for a normal prior, or neither for an even one"
     if prior.mean is not None and not low <= prior.mean <= high:
-        yield f"mean {prior.mean:g} is outside of {low:g} to {high:g}, so the prior excludes it"
-    elif prior.sd is not None and not prior.weights.any():
-        yield f"sd {prior.sd:g}: none of {prior.points} values is near enough to mean {prior.mean:g}; make it larger"
+        yield f"mean = {prior.mean:g} is outside of {low:g} to {high:g}, so the prior excludes it"
+    elif prior.sd is not None and prior.sd < (apart := _distance(prior)) / 2:
+        yield (
+            f"sd = {prior.sd:g} is less than half the distance of the values, {apart:.4g}: one of them or none would "
+            "be likely; make it larger, or give more points"
+        )
+
+
+def _distance(prior: PriorConfig) -> float:
+    """How far apart the values stand, of their logarithms where they are spaced so; 0 of one value."""
+    ends = np.log([prior.minimum, prior.maximum]) if prior.spacing == "log" else (prior.minimum, prior.maximum)
+    return float(ends[1] - ends[0]) / max(prior.points - 1, 1)
 
 
 class PosteriorConfig(TracksConfig):
@@ -161,6 +172,7 @@ class PosteriorConfig(TracksConfig):
     threshold: PriorConfig
     width: PriorConfig
     lapse: PriorConfig = PriorConfig(minimum=0.0, maximum=0.08, points=5)
+    lapse_either_way: bool = False
     guess: PriorConfig | None = None
     rise: PriorConfig | None = None
     floor: PriorConfig | None = None
@@ -174,12 +186,18 @@ class PosteriorConfig(TracksConfig):
             raise ValueError(problem)
         return self
 
+    def scaled(self, prior: PriorConfig) -> Shares:
+        """The values of a level, as the function takes them."""
+        return prior.values if self.scale == "linear" else np.asarray(np.log(prior.values))
+
 
 def _posterior_problems(table: PosteriorConfig) -> Iterator[str]:
     if table.width.minimum <= 0:
         yield f"width.minimum = {table.width.minimum:g} must be above 0"
     if table.scale == "log" and table.threshold.minimum <= 0:
-        yield f'scale = "log": threshold.minimum = {table.threshold.minimum:g} must be above 0'
+        yield f'threshold.minimum = {table.threshold.minimum:g} must be above 0 where scale = "log"'
+    else:
+        yield from _credible_width_problems(table)
     yield from _share_problems(table)
     yield from _target_problems(table)
     yield from _two_factor_problems(table)
@@ -188,12 +206,34 @@ def _posterior_problems(table: PosteriorConfig) -> Iterator[str]:
         yield f"start = {table.start:g} is excluded by the prior of the threshold, {low:g} to {high:g}; widen that"
 
 
+def _credible_width_problems(table: PosteriorConfig) -> Iterator[str]:
+    """A width that the prior has already ends a track at once; one that its values cannot show, never."""
+    asked, values = table.credible_width, table.scaled(table.threshold)
+    if asked is None:
+        return
+    before = float(credible_span(values, table.threshold.weights, log=table.scale == "log"))
+    if asked >= before:
+        yield (
+            f"credible_width = {asked:g}: the interval of the prior is {before:.4g} wide, so that a track would end at "
+            "once; ask for less, or widen the prior"
+        )
+    least = float(credible_span(values, np.eye(len(values)), log=table.scale == "log").min())
+    if asked < least:
+        yield (
+            f"credible_width = {asked:g}: the values of the threshold stand too far apart for an interval narrower "
+            f"than {least:.4g}, so that it would end no track; ask for more, or give threshold more points"
+        )
+
+
 def _share_problems(table: PosteriorConfig) -> Iterator[str]:
     for name, prior in {"lapse": table.lapse, "guess": table.guess}.items():
         if prior is not None and not 0 <= prior.minimum <= prior.maximum < 1:
             yield f"{name}: {prior.minimum:g} to {prior.maximum:g} must be shares, from 0, below 1"
-    if table.guess is not None and table.guess.maximum + table.lapse.maximum >= 1:
-        yield "guess and lapse leave nothing to feel; make their maxima less than 1 together"
+    if table.guess is not None and table.lapse_either_way:
+        yield "lapse_either_way = true: the guess rate is the lapse rate; remove the table guess, or the key"
+    lapses = table.lapse.maximum * (2 if table.lapse_either_way else 1)
+    if lapses + (table.guess.maximum if table.guess else 0.0) >= 1:
+        yield "lapse and guess leave nothing to feel; make their maxima less than 1 together"
 
 
 def _target_problems(table: PosteriorConfig) -> Iterator[str]:
@@ -208,13 +248,13 @@ def _target_problems(table: PosteriorConfig) -> Iterator[str]:
 def _two_factor_problems(table: PosteriorConfig) -> Iterator[str]:
     two = len(table.of) == 2
     if two and table.rule != "entropy":
-        yield f"of = {', '.join(table.of)}: two factors take the rule entropy, not {table.rule}"
+        yield f'rule = {table.rule!r} is of one factor, not of {" and ".join(table.of)}; write rule = "entropy"'
     if two and table.rise is None:
         yield "rise is missing: of two factors the threshold of the first changes along the second; give its values"
     for name in (key for key in ("rise", "floor") if not two and getattr(table, key) is not None):
         yield f"{name} is of two factors; remove it"
     if two and table.scale == "log" and table.floor is not None and table.floor.minimum <= 0:
-        yield f'scale = "log": floor.minimum = {table.floor.minimum:g} must be above 0'
+        yield f'floor.minimum = {table.floor.minimum:g} must be above 0 where scale = "log"'
     if two and table.start is not None:
         yield "start is of one factor; remove it"
 

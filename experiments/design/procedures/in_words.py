@@ -59,7 +59,8 @@ def _posterior(table: PosteriorConfig) -> str:
     parts = {"threshold": table.threshold, "width": table.width, "lapse rate": table.lapse}
     further = {"guess rate": table.guess, "rise": table.rise, "floor": table.floor}
     parts |= {name: one for name, one in further.items() if one is not None}
-    return f"{how} ({shape}; {', '.join(f'{name} {_prior(one)}' for name, one in parts.items())})"
+    lapses = ", lapses either way" if table.lapse_either_way else ""
+    return f"{how} ({shape}; {', '.join(f'{name} {_prior(one)}' for name, one in parts.items())}{lapses})"
 
 
 def _prior(prior: PriorConfig) -> str:

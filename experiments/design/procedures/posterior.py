@@ -26,6 +26,7 @@ WantedParameter = Literal["threshold", "width"]
 _ALIKE = 1e-9
 """Stimuli whose gains differ relatively by less are alike: the first is taken on every machine."""
 _LEAST = 1e-300
+_TAILS = (0.025, 0.975)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,17 +63,32 @@ class AnswerGrid:
 
         A value's weight is spread evenly over its cell, which goes halfway to its neighbours.
         """
-        weights, values = self.marginal(posterior, name), self.axes[name]
-        if len(values) == 1:
-            return np.full((*weights.shape[:-1], len(shares)), values[0])
-        middles = (values[1:] + values[:-1]) / 2
-        edges = np.concatenate([[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]])
-        passed = np.cumsum(weights, axis=-1)
-        wanted = np.asarray(shares) * passed[..., -1:]
-        cell = (passed[..., None] < wanted[..., None, :]).sum(axis=-2)
-        own = np.take_along_axis(weights, cell, axis=-1)
-        missing = np.take_along_axis(passed, cell, axis=-1) - wanted
-        return np.asarray(edges[cell + 1] - (edges[cell + 1] - edges[cell]) * missing / np.where(own > 0, own, 1.0))
+        return _quantiles(self.axes[name], self.marginal(posterior, name), shares)
+
+
+def _quantiles(values: Shares, weights: Shares, shares: Sequence[float]) -> Shares:
+    if len(values) == 1:
+        return np.full((*weights.shape[:-1], len(shares)), values[0])
+    middles = (values[1:] + values[:-1]) / 2
+    edges = np.concatenate([[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]])
+    passed = np.cumsum(weights, axis=-1)
+    wanted = np.asarray(shares) * passed[..., -1:]
+    cell = (passed[..., None] < wanted[..., None, :]).sum(axis=-2)
+    own = np.take_along_axis(weights, cell, axis=-1)
+    missing = np.take_along_axis(passed, cell, axis=-1) - wanted
+    return np.asarray(edges[cell + 1] - (edges[cell + 1] - edges[cell]) * missing / np.where(own > 0, own, 1.0))
+
+
+def credible_span(values: Shares, weights: Shares, *, log: bool = False) -> Shares:
+    """How wide the 95 % credible interval of a parameter is, whose values have these weights (..., values).
+
+    With `log` the values are logarithms, and the width is that of what they are the logarithms of.
+
+    >>> round(float(credible_span(np.linspace(0, 10, 101), np.ones(101))), 2)
+    9.6
+    """
+    ends = _quantiles(values, weights, _TAILS)
+    return np.asarray(np.diff(np.exp(ends) if log else ends)[..., 0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,12 +112,16 @@ def parameter_grid(
     guesses: Shares,
     prior: Shares | None = None,
     shape: Shape = "normal",
+    either_way: bool = False,
 ) -> ParameterGrid:
-    """A grid; without a prior every place has the same. `ValueError`: a prior of another shape, or of nothing."""
+    """A grid; without a prior every place has the same. `either_way`: lapses are guesses as well, g + l.
+
+    `ValueError`: a prior of another shape, or of nothing.
+    """
     axes = {"threshold": thresholds, "width": widths, "lapse": lapses, "guess": guesses}
     places = np.meshgrid(thresholds, widths, indexing="ij")
     levels = np.asarray(stimuli, float)
-    chance, slack = chance_and_slack(lapses, guesses)
+    chance, slack = chance_and_slack(lapses, guesses, either_way=either_way)
     return ParameterGrid(
         stimuli=levels,
         axes={name: np.asarray(values, float) for name, values in axes.items()},
@@ -120,10 +140,14 @@ def checked_prior(prior: Shares | None, sizes: tuple[int, ...]) -> Shares:
     return np.asarray(weights / weights.sum())
 
 
-def chance_and_slack(lapses: Shares, guesses: Shares) -> tuple[Shares, Shares]:
-    """What is right by chance, g, and what F adds to it, 1 - g - l, of lapses × guesses."""
+def chance_and_slack(lapses: Shares, guesses: Shares, *, either_way: bool = False) -> tuple[Shares, Shares]:
+    """What is right by chance, g, and what F adds to it, 1 - g - l, of lapses × guesses.
+
+    `either_way`: whoever lapses says either answer, so that l is in g as well.
+    """
     lapse, guess = (axis.ravel() for axis in np.meshgrid(lapses, guesses, indexing="ij"))
-    return guess, 1 - guess - lapse
+    chance = guess + lapse if either_way else guess
+    return chance, 1 - chance - lapse
 
 
 def posterior_after(

@@ -48,8 +48,9 @@ def surface_grid(
     guesses: Shares,
     prior: Shares | None = None,
     shape: Shape = "normal",
+    either_way: bool = False,
 ) -> SurfaceGrid:
-    """A grid; without a prior every place has the same.
+    """A grid; without a prior every place has the same. `either_way` as of `parameter_grid`.
 
     `ValueError`: stimuli that are no pairs; a prior of another shape, or of nothing.
     """
@@ -68,7 +69,7 @@ def surface_grid(
         place.ravel() for place in np.meshgrid(intercepts, rises, floors, widths, indexing="ij")
     )
     thresholds = threshold_along(pairs[:, 1:], intercept, rise, floor)
-    chance, slack = chance_and_slack(lapses, guesses)
+    chance, slack = chance_and_slack(lapses, guesses, either_way=either_way)
     return SurfaceGrid(
         stimuli=pairs,
         axes={name: np.asarray(values, float) for name, values in axes.items()},
