@@ -12,7 +12,9 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.design.planning import plan_of
 from experiments.rebuild import table
-from experiments.record.journal import Contents, Record
+from experiments.record.design_table import design_rows
+from experiments.record.journal import Contents, Record, read_journal
+from experiments.record.replay import history as told_by
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import step_record
@@ -101,6 +103,17 @@ def test_a_run_that_is_killed_and_resumed_feels_what_the_unbroken_one_felt(tmp_p
     kills, rows = killed_until_done(tmp_path / "killed", random.Random(1), 3)
     assert kills == 3
     assert rows == unbroken(tmp_path / "unbroken")
+
+
+def test_rows_that_a_track_did_not_need_are_marked(tmp_path: Path) -> None:
+    setup = SETUPS["up-down"]
+    done = run(_request(setup, tmp_path), synthetic_screen, VirtualClock())
+    contents = read_journal(done.place.journal)
+    whole = design_rows(contents.plan, told_by(contents), setup.config)
+    kept = {bool(row["attempts"]): row["flags"] for row in whole}
+    assert kept == {True: kept[True], False: "track-over"}
+    cut = design_rows(contents.plan, told_by(replace(contents, records=contents.records[:30])), setup.config)
+    assert not any(row["flags"] for row in cut if row["attempts"] is None)
 
 
 def test_a_run_without_corrections_asks_no_more_trials_than_its_tracks_need(tmp_path: Path) -> None:

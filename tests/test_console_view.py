@@ -16,6 +16,7 @@ from experiments.design import planning
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import damper
+from experiments.load import load_setup
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.progress import trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
@@ -50,6 +51,13 @@ def shown_texts(here: Seen) -> list[str]:
     shown = view.instruction(replace(here, now_s=10.0))
     texts = [shown.title, shown.damper, shown.detail, view.where_text(here), *progress.coming(here)]
     return [*texts, *progress.answer_lines(here), *progress.marks(here), progress.gun_text(here.gun)[0]]
+
+
+def test_what_comes_next_leaves_out_tracks_that_have_ended() -> None:
+    setup = load_setup("threshold")
+    here = seen(setup, Position(step=ask(plan_of(setup).trials[0])))
+    own = [one.direction.upper() for one in here.about.plan.trials[1:] if one.track == 1]
+    assert progress.coming(replace(here, over=frozenset([2]))) == own[:3] != progress.coming(here)
 
 
 # what is never told

@@ -21,6 +21,7 @@ from experiments.load import load_setup
 from tests.designs import design
 from tests.tables_of_designs import loaded, simulated
 
+METHODS = ("asymmetric-1", "asymmetric-2")
 LEVELS = (6.0, 8.0, 10.0, 12.0, 14.0)
 
 
@@ -242,6 +243,27 @@ def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -
     assert (second.track, second.levels[:2], second.successes[:2]) == (2, (12.0, 14.0), (False, True))
     figure_tracks(found, tmp_path / "tracks")
     assert (tmp_path / "tracks.png").stat().st_size > 5000
+
+
+def test_shares_that_a_procedure_held_are_neither_drawn_nor_compared_between_tracks() -> None:
+    """Of conditions within a track they still tell a preference for one answer."""
+    shipped = load_setup("threshold").config
+    rows = [
+        {"participant_id": who, "method": method, "track": 1, "voltage_V": level, "direction": direction}
+        | {"response": direction if right else "backward", "correct": right or int(direction == "backward")}
+        for who in ("A", "B")
+        for method in ("asymmetric-1", "asymmetric-2")
+        for level in (8.0, 12.0)
+        for direction in ("forward", "backward")
+        for right in (1, 0)
+    ]
+    factors = {**shipped.factors, "method": shipped.factors["method"].model_copy(update={"levels": METHODS})}
+    both, table = shipped.model_copy(update={"factors": factors}), pd.DataFrame(rows)
+    apart = summarise(both, table).questions["response"]
+    within = summarise(shipped, table[table["method"] == METHODS[0]]).questions["response"]
+    assert [apart.drawn, within.drawn] == [False, False]
+    reasons = [str(test.reason) for found in (apart, within) for test in found.tests if test.name == "anova"]
+    assert ["each method by the answers" in one for one in reasons] == [True, False]
 
 
 def test_levels_of_two_factors_have_no_single_function() -> None:

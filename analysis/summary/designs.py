@@ -31,6 +31,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR, Level, QuestionConfig, shown_level
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import runs_of_groups
+from experiments.design.procedure_problems import has_success
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -125,7 +126,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
     scored, people = found.scored, found.people
     cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, factors)))
     comparisons = _comparisons(design, question, people, _groups(design, found.real))
-    tests = (*comparisons, *_sensitivity(design, question, scored))
+    tests = (*comparisons, *(() if design.adapted else _sensitivity(design, question, scored)))
     return QuestionSummary(
         kind=question.kind,
         cells=cells,
@@ -134,6 +135,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         chance=chance(question),
         preferred=_preferred(design, name, question, scored),
         scale=_scale(question),
+        held=bool(design.adapted) and has_success(question),
     )
 
 
@@ -289,6 +291,8 @@ MOST_FACTORS = 4
 def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFrame) -> str:
     """Why there is no test of a question's conditions; empty if there is one."""
     instead = f"not tested here; {design.design}_long.csv has everyone's scores for other programs, such as R's afex"
+    if apart := _with_levels_of_their_own(design, people):
+        return f"a procedure chose the levels of each {apart} by the answers: compare thresholds"
     if question.kind == "ranking" and people.columns.nlevels > 1:
         return "ranks of several factors are described, not tested"
     if question.correct is None and len(question.named_answers) > 2:
@@ -300,6 +304,14 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
     if math.prod(_sizes(people)) != people.shape[1]:
         return f"factors that are nested, not crossed, are {instead}"
     return "fewer than two people have all conditions" if len(people) < 2 else ""
+
+
+def _with_levels_of_their_own(design: DesignConfig, people: pd.DataFrame) -> str:
+    """The factors whose conditions have tracks of their own: these differ in levels, and hardly in right answers."""
+    if design.adaptive is None:
+        return ""
+    names = (*design.between, *(str(name) for name in people.columns.names if name is not None))
+    return " and ".join(name for name in names if name not in design.adaptive.mixed)
 
 
 def _sizes(people: pd.DataFrame) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from analysis.report.serial import OPTIONAL
+from analysis.report.serial import OPTIONAL, UNWRITTEN
 from analysis.summary.pairs import PairedComparison
 from analysis.summary.thresholds import Thresholds
 from experiments.design.language import Level
@@ -52,6 +52,7 @@ class QuestionSummary:
     `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
     level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean. `thresholds`: the
     psychometric functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
+    `held`: its share of successes is where a procedure held it, which chose the levels by the answers.
     """
 
     kind: str
@@ -63,3 +64,9 @@ class QuestionSummary:
     scale: str | None = field(default=None, metadata=OPTIONAL)
     thresholds: Thresholds | None = field(default=None, metadata=OPTIONAL)
     pairs: PairedComparison | None = field(default=None, metadata=OPTIONAL)
+    held: bool = field(default=False, metadata=UNWRITTEN)
+
+    @property
+    def drawn(self) -> bool:
+        """Whether what its conditions gave is worth a picture."""
+        return bool(self.cells) and not self.held

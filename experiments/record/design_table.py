@@ -22,6 +22,7 @@ from experiments.record.tables import Column, Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import Answered, Fired, Interrupted, Presented
+from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import correct_columns, is_right
 
 ANTICIPATION_S = 0.1
@@ -137,6 +138,11 @@ def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]
     rows = [_row(plan, design, trial, events) for trial, events in by_trial(plan.trials, history).items()]
     for row in went_back(rows):
         row["flags"] = " ".join(filter(None, (str(row["flags"]), tables.CLOCK_SET_BACK)))
+    left = [row for row in rows if row["track"] and row["attempts"] is None]
+    tracks = adaptive_tracks(design, plan, history) if left else None
+    for row in left:
+        if tracks is not None and row["track"] in tracks.over:
+            row["flags"] = " ".join(filter(None, (str(row["flags"]), tables.TRACK_OVER)))
     return rows
 
 

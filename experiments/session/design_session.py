@@ -26,7 +26,7 @@ from experiments.session.steps import (
     Session,
     Step,
 )
-from experiments.session.tracks import Tracks
+from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import choices, correct_columns, right_answer
 
 RIGHT, WRONG = "That was right.", "That was wrong."
@@ -104,9 +104,8 @@ class _Script:
         scored = next(iter(correct_columns(design.questions)), "")
         feedback = design.practice.feedback if plan.practice else design.trial.feedback
         self._scored = scored if feedback else ""
-        table = None if plan.practice else design.adaptive
-        self._tracks = Tracks(design, table, plan, told) if table else None
-        self._shown = table is not None and table.show_level
+        self._tracks = adaptive_tracks(design, plan, told)
+        self._shown = design.adaptive is not None and design.adaptive.show_level
         self._of_track = _by_track(plan)
 
     def set_of(self, trial: Trial) -> list[Trial]:

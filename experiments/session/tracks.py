@@ -42,6 +42,11 @@ class Tracks:
         self._felt: dict[Trial, Condition] = {}
         self._answers: dict[int, dict[Trial, CountedAnswer]] = {number: {} for number in self._begun}
 
+    @property
+    def over(self) -> frozenset[int]:
+        """The tracks that have ended, by the answers as they count now."""
+        return frozenset(number for number in self._begun if self.is_over(number))
+
     def is_over(self, number: int) -> bool:
         """Whether a track has ended, by the answers so far."""
         return self._track(number).over
@@ -135,3 +140,8 @@ def _begun(design: DesignConfig, table: AdaptiveConfig, plan: Plan) -> dict[int,
         for numbers in cells.values()
         for number, track in zip(sorted(numbers), made, strict=bool(numbers))
     }
+
+
+def adaptive_tracks(design: DesignConfig, plan: Plan, told: History) -> Tracks | None:
+    """The tracks of a plan; `None` where all levels are planned beforehand, as in practice."""
+    return None if design.adaptive is None or plan.practice else Tracks(design, design.adaptive, plan, told)

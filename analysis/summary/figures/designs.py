@@ -48,7 +48,7 @@ class MeanMark:
 
 def figure_design(found: DesignSummary, path_stem: Path) -> None:
     """A panel for each question; PNG, SVG and PDF are written. `ValueError` if no question has a condition."""
-    shown = {name: question for name, question in found.questions.items() if question.cells}
+    shown = {name: question for name, question in found.questions.items() if question.drawn}
     if not shown:
         raise ValueError("the figure of a design needs a question with an answer")
     panel = max(map(_panel_width, shown.values()))

@@ -44,8 +44,8 @@ def sections_of_designs(report: ReportData) -> Iterator[Section]:
 def _design_section(name: str, found: DesignSummary) -> Section:
     return Section(
         title=found.title or name.capitalize(),
-        paragraphs=(_factors(found), *_assumed(found), *_words(found)),
-        pictures=(_picture(name, found),) if any(question.cells for question in found.questions.values()) else (),
+        paragraphs=(_factors(found), *_held(found), *_assumed(found), *_words(found)),
+        pictures=(_picture(name, found),) if any(question.drawn for question in found.questions.values()) else (),
         tables=tuple(table for asked, question in found.questions.items() for table in _tables(found, asked, question)),
     )
 
@@ -72,7 +72,8 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
             tests = [*_tests_words(question, exact=exact)]
             few = [TWO_PEOPLE] if found.n == 2 and tests else []
             fitted = [*threshold_sentences(found, question), *pair_sentences(found, question)]
-            told = " ".join([_cells_words(found, question), *tests, *few, *fitted])
+            cells = [] if question.held and fitted else [_cells_words(found, question)]
+            told = " ".join([*cells, *tests, *few, *fitted])
             yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 
@@ -170,6 +171,15 @@ def _listed(found: DesignSummary, name: str, levels: Sequence[Level]) -> str:
     return ", ".join(shown) if len(shown) <= _LISTED else f"{len(shown)} levels from {shown[0]} to {shown[-1]}"
 
 
+def _held(found: DesignSummary) -> Iterator[str]:
+    held = [asked for asked, question in found.questions.items() if question.held]
+    if held:
+        yield (
+            f"Levels were chosen by the answers, so that the share of successes in {' and '.join(held)} is where the "
+            "procedure held it: thresholds tell what differs."
+        )
+
+
 def _assumed(found: DesignSummary) -> tuple[str, ...]:
     return (f"Assumed, as the design says: {', '.join(found.assumed)}.",) if found.assumed else ()
 
@@ -189,11 +199,12 @@ def lacking_conditions(found: DesignSummary) -> tuple[str, ...]:
 
 
 def _picture(name: str, found: DesignSummary) -> Picture:
-    scored = [question for question in found.questions.values() if question.chance is not None]
+    shown = {asked: question for asked, question in found.questions.items() if question.drawn}
+    scored = [question for question in shown.values() if question.chance is not None]
     parts = ["the exact 95 % interval of all trials together"] if scored else []
-    parts += ["the SD between participants"] if len(scored) < len(found.questions) and found.n > 1 else []
+    parts += ["the SD between participants"] if len(scored) < len(shown) and found.n > 1 else []
     spread = f" Whiskers: {' of right answers, else '.join(parts)}." if parts else ""
-    means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in found.questions.items())
+    means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in shown.items())
     return Picture(
         stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}.{spread}", alt=f"Means by condition. {means}"
     )

@@ -49,11 +49,16 @@ def write_figures(folder: Path, report: ReportData) -> None:
             figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
         if has_points(direction):
             figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
-    for name, one in drawn_designs(statistics).items():
-        figure_design(one, folder / figure_of(name))
+    for name, one in statistics.designs.items():
+        _write_design(folder, name, one)
         _write_models(folder, name, one)
     if report.panels:
         figure_5(report.panels, folder / _SHOT_FIGURE)
+
+
+def _write_design(folder: Path, name: str, design: DesignSummary) -> None:
+    if any(question.drawn for question in design.questions.values()):
+        figure_design(design, folder / figure_of(name))
 
 
 def _write_models(folder: Path, name: str, design: DesignSummary) -> None:
@@ -84,12 +89,6 @@ def tracks_figure_of(name: str, question: str) -> str:
 def pairs_figure_of(name: str, question: str) -> str:
     """The stem of the figure of a question's scores from paired comparison."""
     return f"figure-{name}-{question}-scores"
-
-
-def drawn_designs(statistics: StudyStatistics) -> dict[str, DesignSummary]:
-    """The designs that have something to draw."""
-    found = statistics.designs.items()
-    return {name: one for name, one in found if any(question.cells for question in one.questions.values())}
 
 
 def results_picture(statistics: StudyStatistics, *, compared: bool) -> Picture:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from device import GunStatus
 from experiments.design.plan import Trial
@@ -60,9 +61,9 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     if isinstance(step, steps.Close):
         return ["the end"]
     trials, here = seen.about.plan.trials, seen.here
-    after = trials.index(here) + 1
+    after = [trial for trial in trials[trials.index(here) + 1 :] if trial.track not in seen.over][:count]
     lines: list[str] = []
-    for before, trial in zip(trials[after - 1 :], trials[after : after + count], strict=False):
+    for before, trial in pairwise([here, *after]):
         if lines or not isinstance(step, steps.Rest):  # a break that is taken now is not still to come
             lines += _break_between(seen.about, before, trial)
         lines += _to_do(seen.about, before, trial)

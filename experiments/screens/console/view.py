@@ -118,6 +118,8 @@ class Seen:
     gun: GunSeen | None = None
     participant: ParticipantSeen | None = None
     ended: Ended | None = None
+    over: frozenset[int] = frozenset()
+    """The adaptive tracks that have ended."""
     letters: bool = False
     """Whether letters are text now."""
     now_s: float = 0.0

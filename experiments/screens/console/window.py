@@ -22,9 +22,11 @@ from experiments.screens.participant.messages import Theme
 from experiments.screens.texts import saved_text
 from experiments.session.duration import RunTiming
 from experiments.session.events import Press
+from experiments.session.history import GrowingHistory, History
 from experiments.session.remarks import Halted
 from experiments.session.states import Position
 from experiments.session.steps import Failed, Rested
+from experiments.session.tracks import Tracks, adaptive_tracks
 
 REFRESH_MS = 100
 SOON_MS = 3
@@ -58,6 +60,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         super().__init__()
         self.about, self.clock = about, clock
         self.live: LiveRun | None = None
+        self._told: GrowingHistory = []
+        self._tracks: Tracks | None = None
         self.controls: Controls | None = None
         self.drawn, self._painted = Position(), -1
         self.gun: view.GunSeen | None = None
@@ -111,6 +115,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     def begin(self, live: LiveRun, controls: Controls) -> None:
         """A live run is there, and who works it."""
         self.live, self.controls, self._painted = live, controls, -1
+        self._tracks = adaptive_tracks(self.about.setup.config, self.about.plan, self._told)
 
     def take(self, message: view.Message) -> None:
         """Take a message from the run, which is shown soon."""
@@ -200,16 +205,24 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     @property
     def seen(self) -> view.Seen:
         """Everything that is shown now."""
+        told = () if self.live is None else self.live.history
         return view.Seen(
             about=self.about,
             position=self.drawn,
-            told=() if self.live is None else self.live.history,
+            told=told,
             gun=self.gun,
             participant=self.participant,
             ended=self.ended,
+            over=self._tracks_over(told),
             letters=self._typing.letters,
             now_s=self.clock.now(),
         )
+
+    def _tracks_over(self, told: History) -> frozenset[int]:
+        if self._tracks is None:
+            return frozenset()
+        self._told.extend(told[len(self._told) :])  # one list that grows: each answer is taken once
+        return self._tracks.over
 
     def refresh(self) -> None:
         """Show what is so now.
