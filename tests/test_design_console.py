@@ -141,14 +141,11 @@ def test_a_design_on_the_participants_own_screen_and_keys(configs: Path, tmp_pat
         screen.participant_shows("ChoicePage")
         screen.keys.press("Left")
         screen.until(lambda look: look.serial != asking.serial)
-        screen.at("rating")
-        screen.participant_shows("RatingPage")
-        screen.focus_on(RUN)
-        screen.until(lambda look: look.active)
         screen.answer = lambda _: "r"
-        for trial in (1, 2):
-            screen.to("describing", trial)
-            screen.participant_shows("DescriptionPage", trial)
+        pages = [("rating", "RatingPage"), ("describing", "DescriptionPage")]
+        for state, page, trial in [(state, page, trial) for state, page in pages for trial in (1, 2)]:
+            screen.to(state, trial)
+            screen.participant_shows(page, trial)  # it has taken the keys
             screen.focus_on(RUN)  # the experimenter types what is said
             screen.until(lambda look: look.active)
         screen.to_the_end()

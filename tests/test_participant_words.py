@@ -1,10 +1,13 @@
 import json
+import threading
+from io import BytesIO
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from experiments.screens.participant.app import Wire
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.screens.participant.messages import (
     AskChoice,
@@ -178,3 +181,24 @@ def test_a_moment_goes_to_the_other_clock_and_back():
 )
 def test_a_look_is_what_its_arguments_say(look):
     assert look_from(arguments(look)) == look
+
+
+RATE = AskRating(
+    number=1, of=2, question="?", minimum=0.0, maximum=1.0, minimum_text="", maximum_text="", grain=1.0, ask=1
+)
+CHOOSE = AskChoice(question="?", answers=(KeyedAnswer(answer="a", label="a", key="left"),), onset_s=0.0, ask=2)
+
+
+def heard(*words):
+    """What a participant's program makes of words that were all there before it looked."""
+    wire = Wire(BytesIO(b"".join(map(line, words))), BytesIO(), lambda: 0.0)
+    wire.listen()
+    for listening in [one for one in threading.enumerate() if one.name == "console's words"]:
+        listening.join()
+    return [*iter(wire.word, None)]
+
+
+def test_a_question_to_type_on_that_is_called_off_already_takes_nobody_the_keys():
+    wait, words = Show(text="Wait."), AskDescription(number=1, of=2, question="?", ask=3)
+    assert heard(RATE, wait, words, RATE, CHOOSE, wait) == [wait, CHOOSE, wait, CloseScreen()]
+    assert heard(wait, words, RATE) == [wait, CloseScreen()]

@@ -38,10 +38,17 @@ class Wire:
             self._said.flush()
 
     def word(self) -> messages.ToParticipant | None:
-        """The next word that was heard, if there is one. A console that is gone said `CloseScreen`."""
+        """The next word that was heard, if there is one. A console that is gone said `CloseScreen`.
+
+        A question to type on with a word behind it was called off: put up, it would take a key that is meant for the
+        console.
+        """
+        word: messages.ToParticipant | None = None
         with suppress(queue.Empty):
-            return self._words.get_nowait()
-        return None
+            word = self._words.get_nowait()
+            while isinstance(word, messages.AskRating | messages.AskDescription):
+                word = self._words.get_nowait()
+        return word
 
     def _listen(self) -> None:
         for wire in self._heard:
