@@ -17,7 +17,7 @@ from analysis.report.figures.style import (
     legend_below,
     light_grid,
     method_colour,
-    method_line,
+    method_look,
     method_marker,
     reference_line,
 )
@@ -80,16 +80,7 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
         share, low, high = zip(*(_percents(one) for one in shares), strict=True)
         colour = method_colour(i)
         axes.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0.0)
-        axes.plot(
-            x,
-            share,
-            color=colour,
-            linestyle=method_line(i),
-            marker=method_marker(i),
-            markersize=3.5,
-            linewidth=1.3,
-            label=curve.name,
-        )
+        axes.plot(x, share, **method_look(i), markersize=3.5, linewidth=1.3, label=curve.name)
         if len(x) == 1:
             axes.vlines(x, low, high, color=colour, linewidth=1.3)
     axes.set_ylim(-2.0, 103.0)

@@ -20,9 +20,7 @@ from analysis.report.figures.style import (
     drawn,
     legend_below,
     light_grid,
-    method_colour,
-    method_line,
-    method_marker,
+    method_look,
     reference_line,
 )
 from analysis.report.labels import labelled
@@ -141,9 +139,7 @@ def figure_procedures(found: ThresholdPower, path_stem: Path) -> None:
                     [one.trials for one in own],
                     [getattr(one, measure) for one in own],
                     yerr=[2 * one.bias_se for one in own] if measure == "bias" else None,
-                    color=method_colour(i),
-                    linestyle=method_line(i),
-                    marker=method_marker(i),
+                    **method_look(i),
                     markersize=4.5,
                     capsize=2.0,
                     linewidth=1.2,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import matplotlib as mpl
 from fontTools import subset
@@ -208,6 +208,19 @@ def method_marker(i: int) -> str:
     ('D', '$21$')
     """
     return _MARKERS[i] if i < len(_MARKERS) else f"${i + 1}$"
+
+
+class MethodLook(TypedDict):
+    """How a method's curve is drawn: keywords of `Axes.plot`."""
+
+    color: str
+    linestyle: Any
+    marker: str
+
+
+def method_look(i: int) -> MethodLook:
+    """Colour, line and mark of the method at place `i`."""
+    return MethodLook(color=method_colour(i), linestyle=method_line(i), marker=method_marker(i))
 
 
 _APART_IN = 0.76

@@ -20,6 +20,7 @@ from analysis.report.figures.style import (
     light_grid,
     method_colour,
     method_line,
+    method_look,
     method_marker,
     panel_grid,
     reference_line,
@@ -164,5 +165,5 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
     if len(of.conditions) > 1:
         for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
             name = ", ".join(drawn_name(found.label(factor, level)) for factor, level in condition.levels.items())
-            grid[0].plot([], [], color=method_colour(i), linestyle=method_line(i), marker=method_marker(i), label=name)
+            grid[0].plot([], [], **method_look(i), label=name)
         legend_below(figure, grid[0], 3)

@@ -27,6 +27,7 @@ from analysis.report.figures.style import (
     light_grid,
     method_colour,
     method_line,
+    method_look,
     method_marker,
     name_ticks,
     reference_line,
@@ -131,16 +132,9 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
 def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
     """The methods by colour, mark and, where there are lines, line."""
     return [
-        Line2D(
-            [],
-            [],
-            color=method_colour(i),
-            linestyle=method_line(i) if lines else "none",
-            marker=method_marker(i),
-            markersize=5.5,
-            label=drawn_name(method),
-        )
+        Line2D([], [], **look, markersize=5.5, label=drawn_name(method))
         for i, method in methods
+        for look in [method_look(i) if lines else method_look(i) | {"linestyle": "none"}]
     ]
 
 
@@ -156,9 +150,7 @@ def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
             axes.plot(
                 curve.mean_time_s,
                 100.0 * np.array(curve.accuracy),
-                color=method_colour(i),
-                linestyle=method_line(i),
-                marker=method_marker(i),
+                **method_look(i),
                 markersize=5.5,
                 linewidth=1.7,
                 zorder=3.0,
