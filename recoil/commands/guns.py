@@ -139,7 +139,7 @@ def bench(
     as_json: AsJsonOption = False,
 ) -> None:
     """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
-    from analysis.predict import bench as feature
+    from analysis.predict.bench import run as feature
 
     unknown = set(parts or []) - set(feature.PARTS)
     if unknown:

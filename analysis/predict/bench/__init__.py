@@ -1,0 +1,1 @@
+"""What our own methods cost and buy, measured on this machine."""
