@@ -37,6 +37,7 @@ FIGURES = {
     "power": "power direction --participants 8,10,12,14,16,20 --studies 1000 --out OUT/power",
     "design": "design --grid 20 --out OUT/design",
     "percept": "fit percept --studies 500 --out OUT/percept",
+    "trade": "bench --out OUT/trade",
     "voltages": "analyze OUT/voltages --out OUT/voltages-analysis",
 }
 """The commands whose figures the gallery shows."""

@@ -135,10 +135,10 @@ def bench(
     out: Annotated[Path, typer.Option(help="Folder for bench.json and the report.")] = Path("results/bench"),
     seed: FixedSeedOption = 1,
     repeats: Annotated[int, typer.Option(min=1, help="Runs, of whose times the median is told.")] = 7,
-    batch: Annotated[int, typer.Option(min=1, help="Shots of a batch.")] = 200_000,
+    batch: Annotated[int, typer.Option(min=1, help="Shots of a batch.")] = 20_000,
     as_json: AsJsonOption = False,
 ) -> None:
-    """Measure our own methods: error rates of the post-hoc tests, error against time of a simulated shot."""
+    """What a digit of a shot, a trial, a person or 100 ms costs here, and what it buys; and which post-hoc tests hold."""
     from analysis.predict.bench import run as feature
 
     unknown = set(parts or []) - set(feature.PARTS)
@@ -147,5 +147,6 @@ def bench(
     request = feature.BenchRequest(seed=seed, repeats=repeats, batch=batch, progress=progress)
     say_how_long(feature.bench_time_s(parts or list(feature.PARTS), request))
     found = feature.bench(out, parts or [], request)
-    lines = [line for part in found.parts.values() for line in part.lines]
-    show(found.content, "\n".join([*lines, f"Report: {out / 'report.html'}"]), as_json)
+    lines = [f"  {line}" for line in feature.trade_lines(found)]
+    said = [*([feature.TRADES, *lines] if lines else []), f"Report: {out / 'report.html'}"]
+    show(found.content, "\n".join(said), as_json)

@@ -55,7 +55,7 @@ def sections_of_plan(found: ThresholdPower, figures: Path) -> tuple[Section, ...
     picture = Picture(stem=_FIGURE, caption=caption, alt=f"Line charts by number of trials. {' '.join(_lines(found))}")
     return (
         plan_in_short(found),
-        Section(title="The trade", pictures=(picture,), tables=(_table(found),)),
+        Section(title="The trade", pictures=(picture,), tables=(procedure_table(found),)),
         Section(title="What was assumed", items=tuple(_assumed(found))),
         Section(title="Provenance", tables=(origin_table(found.provenance),)),
     )
@@ -80,7 +80,8 @@ def _words(one: ProcedurePower, digits: int) -> str:
     return f"{one.procedure} (interval {apa.number(one.width, digits)}, error {error}, bias {bias})"
 
 
-def _table(found: ThresholdPower) -> Table:
+def procedure_table(found: ThresholdPower) -> Table:
+    """Every procedure and number of trials."""
     digits = _digits(found)
     return Table(
         caption=f"The threshold in {factor_words(found.factor)}, by procedure and trials; best: least error",
