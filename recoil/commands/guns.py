@@ -138,7 +138,7 @@ def bench(
     batch: Annotated[int, typer.Option(min=1, help="Shots of a batch.")] = 20_000,
     as_json: AsJsonOption = False,
 ) -> None:
-    """What a digit of a shot, a trial, a person or 100 ms costs here, and what it buys; and which post-hoc tests hold."""
+    """What a digit of a shot, a trial, a person or 100 ms costs and buys here; and which post-hoc tests hold."""
     from analysis.predict.bench import run as feature
 
     unknown = set(parts or []) - set(feature.PARTS)
