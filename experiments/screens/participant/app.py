@@ -15,8 +15,9 @@ from pydantic import ValidationError
 
 from experiments.screens.participant import messages
 from experiments.screens.participant.messages import line
+from experiments.screens.participant.noise import MaskingNoise
 from experiments.screens.participant.pages import ChoicePage, DescriptionPage, Drafts, MessagePage, RatingPage
-from experiments.screens.participant.stage import KeyPresses, MaskingNoise, Stage, load_toolkit
+from experiments.screens.participant.stage import KeyPresses, Stage, load_toolkit
 
 
 class Wire:
