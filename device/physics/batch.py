@@ -97,7 +97,7 @@ def machine_code() -> Callable[[Records, Records], None]:
         twin = FunctionType(function.__code__, space)
         twin.__qualname__ = f"{function.__name__}_{_digest(functions)}"  # the compiler's cache goes by it
         # all that is called is copied in: half the time, since a call counts the references to each array
-        how = {"inline": "always"} if function.__name__ in _ONCE else {"forceinline": not entry}
+        how: dict[str, Any] = {"inline": "always"} if function.__name__ in _ONCE else {"forceinline": not entry}
         how |= {"no_cpython_wrapper": not entry, "no_cfunc_wrapper": not entry}  # nobody else calls them
         twins[function] = numba.njit(error_model="numpy", cache=entry, nogil=entry, **how)(twin)
     return twins[each]  # type: ignore[no-any-return]
