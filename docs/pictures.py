@@ -85,6 +85,7 @@ def lab_day(folder: Path, display: str) -> None:
         _start(screen, eye)
     with AtConsole([*day, "--participant", "P02"], folder, display) as screen:
         _first_set(screen)
+        _watched(folder)
         _emergency(screen)
     journal = _run_by_a_person(folder, "direction", "P03")
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:40]))
@@ -161,6 +162,16 @@ def _and_back(screen: AtConsole, key: str, name: str, there: Callable[..., objec
     screen.until(lambda look: not there(look))
 
 
+def _watched(folder: Path) -> None:
+    """The page of `recoil watch`, while the run goes on."""
+    command = warm_start.warm("watch", folder / "pilot" / "results", "--port", "0")
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        address = next(word for line in server.stdout or () for word in line.split() if word.startswith("http://"))
+        _page(address, folder / "watch.png", "1000,680")
+        server.terminate()
+    keep(Image.open(folder / "watch.png"), "watch", 1000)
+
+
 def _emergency(screen: AtConsole) -> None:
     screen.keys.press("F12")
     screen.until(lambda look: look.state == "halted")
@@ -217,7 +228,7 @@ def figures(folder: Path) -> None:
         )
         for number, path in enumerate(drawn, 1):
             keep(Image.open(path), f"figure-{name}{f'-{number}' if len(drawn) > 1 else ''}", 1000)
-    _page(ROOT / "results" / "reference" / "report.html", folder / "report.png")
+    _page(f"file://{ROOT / 'results' / 'reference' / 'report.html'}", folder / "report.png", "1100,1400")
     keep(Image.open(folder / "report.png"), "report", 1000)
 
 
@@ -225,9 +236,9 @@ def _recoil(words: str) -> None:
     subprocess.run(warm_start.warm(*words.split()), check=False, stdout=subprocess.DEVNULL)
 
 
-def _page(html: Path, png: Path) -> None:
-    how = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1100,1400"]
-    subprocess.run(["chromium", *how, f"--screenshot={png}", f"file://{html}"], check=True, capture_output=True)
+def _page(address: str, png: Path, size: str) -> None:
+    how = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size={size}"]
+    subprocess.run(["chromium", *how, f"--screenshot={png}", address], check=True, capture_output=True)
 
 
 def main() -> None:
