@@ -6,7 +6,7 @@ has errors of its own: parameters that no gun can have are a `ValueError`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,14 @@ if TYPE_CHECKING:
     from analysis.logs.reading import Logs
     from analysis.paper.audit.run import Audited
     from analysis.predict.power.results import Power
+    from analysis.predict.threshold_plan.run import ThresholdPower
     from analysis.summary.results import StudyStatistics
     from experiments.config.setup import Setup
     from experiments.design.config import DesignConfig
     from experiments.design.plan import Plan
+
+
+_TARGET = 0.8
 
 
 def load_config(name: str | Path) -> Setup[DesignConfig]:
@@ -172,13 +176,14 @@ def power(
     trials: str | int | Sequence[int] = (),
     effects: str | float | Sequence[float] = (),
     methods: Sequence[str] = (),
-    studies: int = 10_000,
-    target: float = 0.8,
+    studies: int | None = None,
+    target: float = _TARGET,
     seed: int = 1,
-) -> Power:
+) -> Power | ThresholdPower:
     """Simulated power of a config's design, in this process; what is left out is as the config has it.
 
-    Numbers may be a list, or text as on the command line, such as `"8,10,14-20"`.
+    Numbers may be a list, or text as on the command line, such as `"8,10,14-20"`. `studies`: 10,000 unless given. Of a
+    design with a threshold: by procedure and `trials`, how well it would be known, from so many people (200).
 
     >>> found = power("preference", participants=14, studies=50)
     >>> {design.participants for design in found.designs}
@@ -189,15 +194,46 @@ def power(
     from experiments.design.streams import checked_seed
     from recoil.arguments import arguments_named, count_of, file_or_name, numbers_of, share_argument, texts_of
 
+    name = file_or_name("config", config)
+    counted = None if studies is None else count_of("studies", studies, 10_000_000)
+    others = {"participants": participants, "effects": effects, "methods": methods, "target": target != _TARGET}
+    if (plan := _threshold_plan(name, numbers_of("trials", trials), counted, checked_seed(seed), others)) is not None:
+        return plan
     request = PowerRequest(
-        config=file_or_name("config", config),
+        config=name,
         participants=numbers_of("participants", participants),
         trials=numbers_of("trials", trials),
         effects=numbers_of("effects", effects),
         methods=texts_of("methods", methods, "names", "vibration"),
-        studies=count_of("studies", studies, 10_000_000),
+        studies=counted or 10_000,
         target=share_argument("target", target),
         seed=checked_seed(seed),
     )
     with arguments_named():
         return simulated_power(request)
+
+
+def _threshold_plan(
+    config: str, trials: str | None, people: int | None, seed: int, others: Mapping[str, object]
+) -> ThresholdPower | None:
+    """The plan of a threshold; `None` of a config that has none."""
+    from analysis.predict.threshold_plan.run import (
+        OBSERVERS,
+        TRACK_TRIALS,
+        ThresholdRequest,
+        procedures_of,
+        threshold_power,
+    )
+    from experiments.config.door import ConfigError
+    from recoil.arguments import arguments_named
+
+    with arguments_named():
+        if not procedures_of(config):
+            return None
+        if unused := [name for name, given in others.items() if given]:
+            raise ConfigError(
+                f"{', '.join(unused)}: {config} has a threshold, of which only trials and studies are asked"
+            )
+        return threshold_power(
+            ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, observers=people or OBSERVERS, seed=seed)
+        )

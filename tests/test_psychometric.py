@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.stats import norm
 
 from analysis.psychometric.fit import PsychometricFit, psychometric_fit
 from analysis.psychometric.pooling import difference, pooled_group
+from analysis.psychometric.priors import ListedPrior, default_priors
 
 GOLDEN: list[dict[str, Any]] = json.loads((Path(__file__).parent / "golden" / "psignifit.json").read_text())
 LEVELS, TRIALS = np.array([6.0, 8.0, 10.0, 12.0, 14.0]), np.full(5, 20)
@@ -33,6 +35,22 @@ def test_means_are_those_of_psignifit_under_its_priors(case: dict[str, Any]) -> 
     assert found.width.mean == pytest.approx(case["mean"]["width"], abs=0.04 * 3.29)
     for rate in ("lapse", "guess", "overdispersion"):
         assert getattr(found, rate).mean == pytest.approx(case["mean"][rate], abs=0.005)
+
+
+def test_a_listed_prior_is_a_density_between_its_values_and_one_value_is_known() -> None:
+    """Without data to speak of, draws are those of the prior: even over the logarithm of the width, from 1 to 16."""
+    widths, lapses = np.geomspace(1.0, 16.0, 33), np.linspace(0.0, 0.08, 5)
+    own = replace(
+        default_priors(np.array([4.0, 20.0])),
+        width=ListedPrior(values=widths, weights=np.ones(33)),
+        lapse=ListedPrior(values=lapses, weights=np.ones(5)),
+    )
+    few = {"levels": [4.0, 20.0], "right": [1, 1], "trials": [2, 2], "guess": 0.5}
+    found = psychometric_fit(**few, priors=own)
+    assert found.draws[:, 2].max() <= 0.08
+    assert np.median(found.draws[:, 1]) == pytest.approx(4.0, rel=0.15)
+    one = replace(own, lapse=ListedPrior(values=np.array([0.03]), weights=np.ones(1)))
+    assert set(psychometric_fit(**few, priors=one).draws[:, 2]) == {0.03}
 
 
 def test_a_fit_moves_and_stretches_with_its_levels(fit: PsychometricFit) -> None:

@@ -97,6 +97,8 @@ def test_what_found_is_shown_in_a_notebook() -> None:
     power = recoil.power("preference", participants=[8, 14], studies=50)
     assert set(power.to_frame().participants) == {8, 14}
     assert power.to_dict()["studies"] == 50
+    plan = recoil.power("threshold", trials=[10, 12], studies=4)
+    assert set(plan.to_frame().trials) == {10, 12}
 
 
 @pytest.mark.slow
@@ -127,6 +129,7 @@ def test_what_found_is_shown_in_a_notebook() -> None:
         (lambda _, __: recoil.power("preference", participants="abc"), "participants = abc: 'abc' is no whole number"),
         (lambda _, __: recoil.power("preference", participants=None), "participants = None: must be a number, a list"),
         (lambda _, __: recoil.power("preference", trials=-1), "trials = -1: "),
+        (lambda _, __: recoil.power("threshold", participants=5), "participants: threshold has a threshold, of which"),
         (lambda _, __: recoil.power("preference", effects="x"), "effects = x: 'x' must be a number"),
         (lambda _, __: recoil.power("preference", methods="ramp"), "methods = 'ramp': must be a list of names"),
         (lambda _, __: recoil.power("preference", methods=["x"]), "methods = x: must be two or more"),

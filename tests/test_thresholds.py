@@ -11,12 +11,14 @@ import pytest
 from scipy.stats import norm
 
 from analysis.psychometric.people import PersonFit
+from analysis.psychometric.priors import default_priors
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
-from analysis.summary.thresholds import MOST_FITTED, Thresholds, thresholds
+from analysis.summary.thresholds import MOST_FITTED, Thresholds, priors_of, thresholds
 from experiments.design.config import DesignConfig
+from experiments.design.procedures.config import PosteriorConfig
 from experiments.load import load_setup
 from tests.designs import design
 from tests.tables_of_designs import loaded, simulated
@@ -264,6 +266,20 @@ def test_shares_that_a_procedure_held_are_neither_drawn_nor_compared_between_tra
     assert [apart.drawn, within.drawn] == [False, False]
     reasons = [str(test.reason) for found in (apart, within) for test in found.tests if test.name == "anova"]
     assert ["each method by the answers" in one for one in reasons] == [True, False]
+
+
+def test_a_fit_has_the_priors_of_the_procedure_that_chose_its_levels() -> None:
+    """Trials at the threshold tell little of lapses and width: what is thought of them moves the threshold."""
+    shipped = load_setup("threshold").config
+    table, levels = shipped.adaptive, np.array([4.0, 20.0])
+    assert isinstance(table, PosteriorConfig)
+    own = priors_of(shipped, levels)
+    assert (own.lapse.low, own.lapse.most) == (0.0, 0.08)
+    assert (own.width.low, own.width.high) == (pytest.approx(1.0), pytest.approx(16.0))
+    assert own.threshold == default_priors(levels).threshold
+    of_log = shipped.model_copy(update={"procedure": table.model_copy(update={"scale": "log"})})
+    assert priors_of(of_log, levels).width == default_priors(levels).width
+    assert priors_of(load_setup("staircase").config, levels) == default_priors(levels)
 
 
 def test_levels_of_two_factors_have_no_single_function() -> None:

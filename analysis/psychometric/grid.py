@@ -81,7 +81,7 @@ def posterior(counts: LevelCounts, priors: Priors, fixed: dict[str, float]) -> P
     bounds = {
         "threshold": (priors.threshold.low, priors.threshold.high),
         "width": (priors.width.low, priors.width.high),
-        "lapse": (0.0, priors.lapse.most),
+        "lapse": (priors.lapse.low, priors.lapse.most),
         "guess": (0.0, priors.guess.most),
         "overdispersion": (0.0, priors.overdispersion.most),
     }

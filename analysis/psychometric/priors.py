@@ -36,9 +36,44 @@ class RatePrior:
     against: float = 10.0
     most: float = 0.5
 
+    @property
+    def low(self) -> float:
+        """The smallest rate."""
+        return 0.0
+
     def density(self, x: FloatArray) -> FloatArray:
         """Up to a constant."""
         return np.asarray((1 - x) ** (self.against - 1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ListedPrior:
+    """Weights (n,) of values (n,), lowest first, as a procedure's grid has them; a density between them.
+
+    Of one value the parameter is known.
+    """
+
+    values: FloatArray
+    weights: FloatArray
+
+    @property
+    def low(self) -> float:
+        """The smallest value."""
+        return float(self.values[0])
+
+    @property
+    def high(self) -> float:
+        """The largest value."""
+        return float(self.values[-1])
+
+    @property
+    def most(self) -> float:
+        """The largest value, of a rate."""
+        return self.high
+
+    def density(self, x: FloatArray) -> FloatArray:
+        """Up to a constant."""
+        return np.asarray(np.interp(x, self.values, self.weights / np.gradient(self.values), left=0.0, right=0.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +81,8 @@ class Priors:
     """Of threshold and width, in the unit of the levels (of a fit on a logarithmic axis: of their logarithms)."""
 
     threshold: PlateauPrior
-    width: PlateauPrior
-    lapse: RatePrior = RatePrior()
+    width: PlateauPrior | ListedPrior
+    lapse: RatePrior | ListedPrior = RatePrior()
     guess: RatePrior = RatePrior()
     overdispersion: RatePrior = RatePrior(most=0.999)
 

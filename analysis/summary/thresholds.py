@@ -24,12 +24,13 @@ from analysis.psychometric.people import (
     threshold_difference,
     with_group,
 )
-from analysis.psychometric.priors import default_priors
+from analysis.psychometric.priors import ListedPrior, Priors, default_priors
 from analysis.report.serial import UNWRITTEN, beside
 from analysis.stats.arrays import FloatArray
 from analysis.summary.tracks import TrackAnswers, tracks_in
 from experiments.design.config import DesignConfig
 from experiments.design.language import INTERVAL_NAMES, YES, Level, QuestionConfig, shown_level
+from experiments.design.procedures.config import PosteriorConfig
 from experiments.tasks.questions import chance, correct_columns
 
 MOST_FITTED, MOST_FITS = 40, 60
@@ -67,7 +68,7 @@ class Thresholds:
 
     `share`: of what, right answers, yes, or the level chosen over the standard. `guess`: chance where the design knows
     it. Of the `people` so many were `fitted`. `even`: trials whose two intervals had the same level. `tracks`: of a
-    procedure that chose the levels from the answers.
+    procedure that chose the levels from the answers; `own_priors`: its priors of width and lapse rate are the fit's.
     """
 
     factor: str
@@ -78,6 +79,7 @@ class Thresholds:
     people: int = 0
     fitted: int = 0
     even: int = 0
+    own_priors: bool = field(default=False, metadata=UNWRITTEN)
     conditions: tuple[ConditionFit, ...] = ()
     differences: tuple[ConditionDifference, ...] = ()
     reason: str | None = None
@@ -149,6 +151,7 @@ class _Answers:
 
     def __init__(self, design: DesignConfig, name: str, factor: str, share: FittedShare, table: pd.DataFrame) -> None:
         question = design.questions[name]
+        self.design = design
         self.conditions = [
             one
             for one, of in design.factors.items()
@@ -227,7 +230,7 @@ def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresho
     if np.unique(levels).size < 2:
         return replace(found, people=len(codes), reason="the answers are all at one level")
     falling = found.share != "chosen" and _falls(levels, rows["success"].to_numpy(dtype=np.float64))
-    priors = default_priors(-levels if falling else levels)
+    priors = priors_of(answers.design, -levels if falling else levels)
     span, conditions = (float(levels.min()), float(levels.max())), []
     for of, people in answers.of_people(chosen):
         fits = [person_fit(one, guess=found.guess, falling=falling, span=span, priors=priors) for one in people]
@@ -236,11 +239,32 @@ def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresho
     return replace(
         found,
         falling=falling,
+        own_priors=has_own_priors(answers.design),
         people=len(codes),
         fitted=len(chosen),
         conditions=tuple(conditions),
         differences=tuple(_differences(conditions)),
     )
+
+
+def has_own_priors(design: DesignConfig) -> bool:
+    """Whether a design says what it thinks of the width and of lapses: its procedure's levels rest on that."""
+    return isinstance(design.adaptive, PosteriorConfig) and len(design.adapted) == 1
+
+
+def priors_of(design: DesignConfig, levels: FloatArray) -> Priors:
+    """Psignifit's priors; width and lapse rate as the design's procedure takes them, where it says so.
+
+    A procedure that measures a threshold learns little of either, so that the fit rests on what is thought of them.
+    The threshold's stays flat, so that people can be pooled. Of the logarithm a width is no width of the level.
+    """
+    priors, table = default_priors(levels), design.adaptive
+    if not isinstance(table, PosteriorConfig) or not has_own_priors(design):
+        return priors
+    lapse = ListedPrior(values=table.lapse.values, weights=table.lapse.weights)
+    if table.scale == "log":
+        return replace(priors, lapse=lapse)
+    return replace(priors, lapse=lapse, width=ListedPrior(values=table.width.values, weights=table.width.weights))
 
 
 def _pooled(answers: _Answers) -> Iterator[tuple[tuple[tuple[str, Level], ...], tuple[ShareAtLevel, ...]]]:

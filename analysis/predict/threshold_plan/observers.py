@@ -10,7 +10,14 @@ from scipy.special import ndtr
 
 from analysis.stats.arrays import FloatArray
 from analysis.summary.thresholds import FittedShare
-from experiments.design.procedures.posterior import best_stimulus, parameter_grid, posterior_after, variance_rule
+from experiments.design.procedures.choosing import PosteriorRule
+from experiments.design.procedures.posterior import (
+    VarianceRule,
+    best_stimulus,
+    parameter_grid,
+    posterior_after,
+    variance_rule,
+)
 from experiments.design.procedures.up_down import LevelRange, TrackEnd, UpDown, track_after
 
 _STEPS = 60
@@ -53,13 +60,22 @@ def procedures(share: FittedShare) -> tuple[str, ...]:
 
 
 def answers_by(
-    procedure: str, people: Observers, levels: Sequence[float], trials: int, stream: np.random.Generator
+    procedure: str,
+    people: Observers,
+    levels: Sequence[float],
+    trials: int,
+    stream: np.random.Generator,
+    *,
+    own: PosteriorRule | None = None,
 ) -> Answers:
-    """All answers of the people; `levels`: those of the design, between which everything adaptive stays."""
+    """All answers of the people; `levels`: those of the design, between which everything adaptive stays.
+
+    `own`: the posterior rule that the design has.
+    """
     if procedure == "constant stimuli":
         return _constant(people, np.array(levels), trials, stream)
     if procedure == "posterior":
-        return _posterior(people, levels, trials, stream)
+        return _posterior(people, levels, trials, stream, own)
     return _track(int(procedure[0]), people, levels, trials, stream)
 
 
@@ -94,10 +110,30 @@ def _track(down: int, people: Observers, levels: Sequence[float], trials: int, s
     return Answers(levels=shown, right=np.array(answers, dtype=float))
 
 
-def _posterior(people: Observers, levels: Sequence[float], trials: int, stream: np.random.Generator) -> Answers:
-    """The rule of least expected variance of the threshold; guess rates are known of right answers alone."""
+def _posterior(
+    people: Observers,
+    levels: Sequence[float],
+    trials: int,
+    stream: np.random.Generator,
+    own: PosteriorRule | None,
+) -> Answers:
+    """The design's own rule, else that of least expected variance of the threshold."""
+    count, rule = people.thresholds.size, _vague_rule(people, levels) if own is None else own.rule
+    known, stimuli = rule.known, np.linspace(min(levels), max(levels), _STEPS + 1) if own is None else np.array(levels)
+    posterior = np.repeat(known.start()[None], count, axis=0)
+    shown, right = np.empty((count, trials)), np.empty((count, trials))
+    for trial in range(trials):
+        place = best_stimulus(rule.gains(posterior))
+        shown[:, trial] = stimuli[place]
+        right[:, trial] = stream.random(count) < people.shares(shown[:, trial])
+        posterior = posterior_after(known, posterior, place, right[:, trial] > 0)
+    return Answers(levels=shown, right=right)
+
+
+def _vague_rule(people: Observers, levels: Sequence[float]) -> VarianceRule:
+    """Guess rates are known of right answers alone."""
     low, high = min(levels), max(levels)
-    span, count = high - low, people.thresholds.size
+    span = high - low
     known = parameter_grid(
         stimuli=np.linspace(low, high, _STEPS + 1),
         thresholds=np.linspace(low - span / 4, high + span / 4, _THRESHOLDS),
@@ -105,12 +141,4 @@ def _posterior(people: Observers, levels: Sequence[float], trials: int, stream: 
         lapses=np.array(_LAPSES),
         guesses=np.array([people.guess] if people.chance else _GUESSES),
     )
-    rule = variance_rule(known)
-    posterior = np.repeat(known.start()[None], count, axis=0)
-    shown, right = np.empty((count, trials)), np.empty((count, trials))
-    for trial in range(trials):
-        place = best_stimulus(rule.gains(posterior))
-        shown[:, trial] = known.stimuli[place]
-        right[:, trial] = stream.random(count) < people.shares(shown[:, trial])
-        posterior = posterior_after(known, posterior, place, right[:, trial] > 0)
-    return Answers(levels=shown, right=right)
+    return variance_rule(known)

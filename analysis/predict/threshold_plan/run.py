@@ -10,14 +10,17 @@ import numpy as np
 from analysis.predict.power.grid import whole_numbers
 from analysis.predict.threshold_plan.observers import Answers, Observers, answers_by, procedures
 from analysis.psychometric.people import PersonFit, ShareAtLevel, person_fit
-from analysis.psychometric.priors import Priors, default_priors
+from analysis.psychometric.priors import Priors
 from analysis.report.serial import NotebookResult, plain
 from analysis.report.terminal import untold
 from analysis.stats.arrays import FloatArray
-from analysis.summary.thresholds import FittedShare, fitted_share, numeric_factor
+from analysis.summary.thresholds import FittedShare, fitted_share, has_own_priors, numeric_factor, priors_of
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.procedure_problems import guess_of
+from experiments.design.procedures.choosing import PosteriorRule, posterior_rule
+from experiments.design.procedures.config import PosteriorConfig
 from experiments.design.streams import generator
 from experiments.load import find, load_setup
 from experiments.record.provenance import provenance
@@ -183,12 +186,20 @@ def _of_procedure(
         chance=planned.share == "right",
     )
     stream = generator(request.seed, "threshold power", procedure)
-    answers = answers_by(procedure, people, planned.levels, max(trials), stream)
-    priors = default_priors(np.array(planned.levels))
+    answers = answers_by(procedure, people, planned.levels, max(trials), stream, own=_own_rule(planned))
+    priors = priors_of(planned.design, np.array(planned.levels))
     known = planned.guess if planned.share == "right" else None
     for count in trials:
         fits = [_fit(answers, place, count, known, priors) for place in range(request.observers)]
         yield _power(procedure, planned, count, fits, people.thresholds)
+
+
+def _own_rule(planned: _Planned) -> PosteriorRule | None:
+    """The posterior rule of the design, if it has one."""
+    table = planned.design.adaptive
+    if not isinstance(table, PosteriorConfig) or not has_own_priors(planned.design):
+        return None
+    return posterior_rule(table, [planned.levels], guess_of(planned.design.questions[planned.question]))
 
 
 def _fit(answers: Answers, place: int, count: int, guess: float | None, priors: Priors) -> PersonFit:

@@ -83,11 +83,17 @@ def _what(of: Thresholds) -> str:
         halfway = f"the level halfway between guess and lapse rate{right}"
     return (
         f"The share of {_SHARES[of.share]} {way} with {factor_words(of.factor)} as a cumulative normal, fitted person "
-        f"by person on a grid of threshold, width and rates ({guess}; lapse rate fitted; priors of psignifit 4). "
+        f"by person on a grid of threshold, width and rates ({guess}; lapse rate fitted; {_PRIORS[of.own_priors]}). "
         f"{_measure(of).capitalize()}: {halfway}. JND: half the distance between the levels at a quarter and three "
         "quarters of the way. Numbers are medians with 95 % credible intervals; the means over people and the pooled "
         "values draw people towards each other, the more the less their own answers tell."
     )
+
+
+_PRIORS = {
+    False: "priors of psignifit 4",
+    True: "priors of width and lapse rate those of the design's procedure, of the threshold psignifit 4's",
+}
 
 
 def _who(of: Thresholds) -> Iterator[str]:
