@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.special import logit, ndtri
 
 from analysis.paper.recurrence import wilson_interval
 from analysis.psychometric.fit import PsychometricFit, psychometric_fit
 from analysis.psychometric.priors import PlateauPrior, Priors
+from analysis.summary.thresholds import thresholds
 from device.methods import paper_methods
 from device.parameters import GunParameters
+from experiments.clock import VirtualClock
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.procedures.posterior import best_stimulus, parameter_grid, posterior_after, variance_rule
 from experiments.design.procedures.psychometric import share_felt
+from experiments.run import RunRequest, run
+from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.diffusion import People
+from experiments.synthetic.laws import SyntheticAnswers
 from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percept_of
 from tests.conftest import Soak
+from tests.designs import changed
 
 pytestmark = pytest.mark.soak
 
@@ -80,7 +94,8 @@ def voltage_at(found: PsychometricFit, share: float) -> np.ndarray:
     """The voltage with so many right answers, lapses included: its 95 % interval around the median."""
     threshold, width, lapse, guess = found.draws.T[:4]
     felt = np.clip((share - guess) / (1 - guess - lapse), 1e-9, 1 - 1e-9)
-    return np.quantile(threshold + width * np.log(felt / (1 - felt)) / (2 * np.log(19)), [0.025, 0.5, 0.975])
+    widths_off = ndtri(felt) / (2 * ndtri(0.95)) if found.shape == "normal" else logit(felt) / (2 * logit(0.95))
+    return np.quantile(threshold + width * widths_off, [0.025, 0.5, 0.975])
 
 
 @pytest.mark.parametrize(
@@ -111,6 +126,70 @@ def test_a_run_brackets_the_voltage_of_three_in_four(someone: Somebody, soak: So
         f" the fit check has p < .05 in {100 * np.mean([found.goodness.p < 0.05 for found in fits]):.1f} % of runs",
     )
     assert held >= WANTED * RUNS
+
+
+WHOLE = 500
+
+
+def test_whole_sessions_bracket_the_voltage_of_three_in_four(memory: Path, soak: Soak) -> None:
+    """Through the engine, the simulated gun and the journal to the table, and the report's own fit of that."""
+    someone = Somebody("asymmetric-2", 0.213, 160)
+    true = float(np.interp(0.75, shares_right(someone), VOLTAGES))
+    setup, fits, rows = whole_setup(someone), list[PsychometricFit](), 0
+    for seed in range(WHOLE):
+        folder = memory / str(seed)
+        done = run(
+            RunRequest(setup=setup, participant_id="P01", results=folder, seed=seed), synthetic_screen, VirtualClock()
+        )
+        table = pd.read_csv(done.place.table)
+        rows += int(table["response"].notna().sum())
+        assert done.place.journal.stat().st_size > 0
+        found = thresholds(setup.config, "response", table)
+        assert found is not None
+        fits += [one.fit for one in found.conditions[0].people if one.fit is not None]
+        shutil.rmtree(folder)
+    assert (len(fits), rows) == (WHOLE, WHOLE * someone.trials)
+    starts, estimates, ends = np.array([voltage_at(found, 0.75) for found in fits]).T
+    held = int(((starts <= true) & (true <= ends)).sum())
+    low, high = wilson_interval(held, WHOLE)
+    soak(
+        f"whole sessions, {someone.method}, the paper's sensitivity, {someone.trials} trials: voltage of 75 % in the"
+        " 95 % interval",
+        f"{100 * held / WHOLE:.1f} % [{100 * low:.1f}, {100 * high:.1f}]",
+        f"{100 * WANTED:.0f} %",
+        f"{WHOLE} runs of the engine on the simulated gun with a model-based participant, journal to table, then the"
+        f" report's fit (cumulative normal); true {true:.2f} V, median estimate off by"
+        f" {np.median(estimates) - true:+.2f} V, interval {np.median(ends - starts):.1f} V wide in the median",
+    )
+    assert held >= WANTED * WHOLE
+
+
+def whole_setup(someone: Somebody) -> Setup[DesignConfig]:
+    """The shipped threshold over 2 to 24 V, with priors as vague as the model's curve, answered from what is felt."""
+    setup = changed(
+        "threshold",
+        below_break_away=True,
+        factors={
+            "method": {"levels": (someone.method,)},
+            "voltage_V": {"levels": {"minimum": 2.0, "maximum": 24.0, "grain": 0.5}},
+        },
+        procedure={
+            "trials": someone.trials // 2,
+            "threshold": {"minimum": 0.0, "maximum": 30.0, "points": 61},
+            "width": {"minimum": 3.0, "maximum": 80.0, "points": 20},
+        },
+        timing={"planned_s": 3000.0},
+    )
+    felt = {"law": "diffusion", "percept": {"sensitivity": someone.sensitivity}}
+    return replace(setup, laws=SyntheticAnswers.model_validate({"questions": {"response": felt}}))
+
+
+@pytest.fixture
+def memory() -> Iterator[Path]:
+    """A folder in memory, where that can be: the runs are about levels and not about the disk."""
+    shared = Path("/dev/shm")  # noqa: S108 - a folder of its own in it
+    with TemporaryDirectory(dir=shared if shared.is_dir() else None) as folder:
+        yield Path(folder)
 
 
 @pytest.mark.parametrize("method", ["asymmetric-1", "asymmetric-2"])

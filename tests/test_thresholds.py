@@ -282,6 +282,20 @@ def test_a_fit_has_the_priors_of_the_procedure_that_chose_its_levels() -> None:
     assert priors_of(load_setup("staircase").config, levels) == default_priors(levels)
 
 
+def test_levels_that_followed_answers_are_no_sign_that_successes_fall_with_the_level() -> None:
+    """Who is always right is led to the lowest levels, and who never is to the highest."""
+    rows = [
+        {"participant_id": who, "method": METHODS[0], "track": 1, "voltage_V": level, "direction": "forward"}
+        | {"response": "forward" if right else "backward", "correct": right}
+        for who, right, levels in (("A", 1, (4.0, 5.0)), ("B", 0, (19.0, 20.0)))
+        for level in levels * 20
+    ]
+    found = thresholds(load_setup("threshold").config, "response", pd.DataFrame(rows))
+    assert found is not None
+    assert not found.falling
+    assert [one.fit and one.fit.where for one in found.conditions[0].people] == ["below", "above"]
+
+
 def test_levels_of_two_factors_have_no_single_function() -> None:
     config = load_setup("threshold").config
     both = config.adaptive.model_copy(update={"of": ("voltage_V", "pulse_s")})

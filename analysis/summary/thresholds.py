@@ -151,7 +151,7 @@ class _Answers:
 
     def __init__(self, design: DesignConfig, name: str, factor: str, share: FittedShare, table: pd.DataFrame) -> None:
         question = design.questions[name]
-        self.design = design
+        self.design, self.factor = design, factor
         self.conditions = [
             one
             for one, of in design.factors.items()
@@ -164,6 +164,12 @@ class _Answers:
         rows = rows[rows["success"].notna()]
         self.rows = rows[rows["level"].notna()]
         self.catch = rows[rows["level"].isna()]
+
+    @property
+    def could_be_met(self) -> FloatArray:
+        """The levels that a procedure could choose, which answers have no part in; else those that were met."""
+        chosen = _numbers(self.design.factors[self.factor].all_levels) if self.design.adapted else self.rows["level"]
+        return np.asarray(chosen, dtype=np.float64)
 
     def of_people(self, codes: Sequence[Hashable]) -> Iterator[tuple[dict[str, Level], list[PersonFit]]]:
         """The people in each condition, in the order of their codes; whoever has no trial in it is not there."""
@@ -229,9 +235,11 @@ def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresho
     levels = rows["level"].to_numpy(dtype=np.float64)
     if np.unique(levels).size < 2:
         return replace(found, people=len(codes), reason="the answers are all at one level")
-    falling = found.share != "chosen" and _falls(levels, rows["success"].to_numpy(dtype=np.float64))
-    priors = priors_of(answers.design, -levels if falling else levels)
-    span, conditions = (float(levels.min()), float(levels.max())), []
+    asked = found.share != "chosen" and not answers.design.adapted  # low levels follow right answers: no sign of a fall
+    falling = asked and _falls(levels, rows["success"].to_numpy(dtype=np.float64))
+    met = answers.could_be_met
+    priors = priors_of(answers.design, -met if falling else met)
+    span, conditions = (float(met.min()), float(met.max())), []
     for of, people in answers.of_people(chosen):
         fits = [person_fit(one, guess=found.guess, falling=falling, span=span, priors=priors) for one in people]
         whole, group = with_group(fits)
