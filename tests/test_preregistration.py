@@ -15,7 +15,7 @@ from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
 from analysis.summary.analyze import Request, result_files
-from analysis.summary.announced import names_of_tests
+from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
 from analysis.summary.results import StudyStatistics
@@ -34,6 +34,7 @@ from experiments.study.preregistration import PreregistrationError, plain_value,
 from experiments.study.study import Facts
 from recoil.config_files import new_study
 from tests.conftest import Recoil, refused
+from tests.designs import changed
 from tests.tables_of_designs import loaded, simulated
 
 KEYS: dict[str, tuple[tuple[str, str, object, object], ...]] = {
@@ -497,3 +498,12 @@ def test_the_commands_freeze_warn_and_report(recoil: Recoil, study: Path) -> Non
     forged(study / "preregistration-1.json", "value")
     refused(recoil("freeze", study), "was edited", "from a copy")
     assert recoil("check", study / "study.toml").returncode == 1
+
+
+def test_of_levels_that_answers_choose_thresholds_are_announced_and_not_shares_of_right_answers() -> None:
+    (said,) = sentences_of_tests(load_setup("staircase").config)
+    assert said.startswith("staircase, interval: a cumulative normal over pulse_s, whose levels a procedure chose")
+    assert "share of right answers" not in said
+    both = changed("threshold", factors={"method": {"levels": ("asymmetric-1", "asymmetric-2")}}).config
+    assert names_of_tests(both, both.questions["response"]) == ()
+    assert names_of_tests(load_setup("threshold").config, both.questions["response"]) == ("anova",)

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from analysis.summary.designs import MOST_FACTORS, varied
+from analysis.summary.designs import MOST_FACTORS, varied, with_levels_of_their_own
 from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig
+from experiments.design.procedure_problems import has_success
 from experiments.tasks.questions import chance
 
 TestName = Literal["anova", "friedman", "tukey", "exponent", "d_prime", "criterion"]
@@ -19,7 +20,9 @@ TestName = Literal["anova", "friedman", "tukey", "exponent", "d_prime", "criteri
 
 def names_of_tests(design: DesignConfig, question: QuestionConfig) -> tuple[TestName, ...]:
     """The tests of a question by their names in the statistics; none where its answers are only described."""
-    return (*_comparisons(design, question), *_sensitivity(question)) if question.kind != "text" else ()
+    if question.kind == "text":
+        return ()
+    return (*_comparisons(design, question), *(() if design.adapted else _sensitivity(question)))
 
 
 def _comparisons(design: DesignConfig, question: QuestionConfig) -> Iterator[TestName]:
@@ -54,6 +57,7 @@ def _is_described(design: DesignConfig, question: QuestionConfig, within: list[s
         or len(design.between) > 1
         or len(within) > MOST_FACTORS
         or any(factor.within is not None for factor in design.factors.values())
+        or bool(with_levels_of_their_own(design, (*design.between, *within)))
     )
 
 
@@ -97,12 +101,20 @@ def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
         "criterion": "and the criterion",
     }
     names = names_of_tests(design, question)
-    by_chance = chance(question)
-    yield f"the score is {_score(question)}"
+    held = bool(design.adapted) and has_success(question)
+    by_chance = None if held else chance(question)
+    if held and len(design.adapted) == 1:
+        yield (
+            f"a cumulative normal over {design.adapted[0]}, whose levels a procedure chose by the answers, is fitted "
+            "person by person; thresholds, their mean over people and their differences between conditions have 95 % "
+            "credible intervals"
+        )
+    if names or not held:
+        yield f"the score is {_score(question)}"
     yield from (told[name] for name in names)
     if by_chance is not None:
         yield f"each condition against chance ({by_chance:g}) by an exact binomial test over all answers"
-    if not names and by_chance is None:
+    if not (names or held) and by_chance is None:
         yield "it is described, not tested"
 
 

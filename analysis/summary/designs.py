@@ -291,8 +291,9 @@ MOST_FACTORS = 4
 def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFrame) -> str:
     """Why there is no test of a question's conditions; empty if there is one."""
     instead = f"not tested here; {design.design}_long.csv has everyone's scores for other programs, such as R's afex"
-    if apart := _with_levels_of_their_own(design, people):
-        return f"a procedure chose the levels of each {apart} by the answers: compare thresholds"
+    named = (*design.between, *(str(name) for name in people.columns.names if name is not None))
+    if apart := with_levels_of_their_own(design, named):
+        return f"a procedure chose the levels of each {' and '.join(apart)} by the answers: compare thresholds"
     if question.kind == "ranking" and people.columns.nlevels > 1:
         return "ranks of several factors are described, not tested"
     if question.correct is None and len(question.named_answers) > 2:
@@ -306,12 +307,9 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
     return "fewer than two people have all conditions" if len(people) < 2 else ""
 
 
-def _with_levels_of_their_own(design: DesignConfig, people: pd.DataFrame) -> str:
+def with_levels_of_their_own(design: DesignConfig, names: Iterable[str]) -> list[str]:
     """The factors whose conditions have tracks of their own: these differ in levels, and hardly in right answers."""
-    if design.adaptive is None:
-        return ""
-    names = (*design.between, *(str(name) for name in people.columns.names if name is not None))
-    return " and ".join(name for name in names if name not in design.adaptive.mixed)
+    return [] if design.adaptive is None else [name for name in names if name not in design.adaptive.mixed]
 
 
 def _sizes(people: pd.DataFrame) -> tuple[int, ...]:
