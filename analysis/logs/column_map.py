@@ -20,10 +20,8 @@ So the same rules check them. `configs/examples/columns.toml` shows every key. W
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
@@ -33,21 +31,13 @@ from analysis.logs.files import LONGEST_LOG, BadLogError
 from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
+from analysis.logs.separated import SeparatedLine, TextFormat, separated_lines
 from analysis.logs.texts import CsvRecord
 from experiments.config.door import Model, once
 from experiments.config.lines import LineText
 from experiments.design.language import NumberScale
 from experiments.record import tables
 from experiments.tasks.questions import on_scale
-
-
-class TextFormat(Model):
-    """How the file is written."""
-
-    delimiter: Literal[",", ";", "\t", "|"] = ","
-    encoding: Literal["utf-8", "utf-8-sig", "cp1252", "latin-1", "utf-16"] = "utf-8-sig"
-    decimal: Literal[".", ","] = "."
-    missing: tuple[str, ...] = ("", "None", "NA", "nan")
 
 
 class ColumnNames(Model):
@@ -151,6 +141,12 @@ class ColumnMap(Model):
     rating: ScaleMapping | None = None
     skip: tuple[Skip, ...] = ()
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Every column of a file that the map names."""
+        named = [*self.columns.model_dump(exclude_none=True).values(), *(skip.column for skip in self.skip)]
+        return tuple(filter(None, [self.participant.column, *named]))
+
     @model_validator(mode="after")
     def _measures_are_named(self) -> Self:
         lacking = [name for name in MEASURES[self.experiment].named if getattr(self.columns, name) is None]
@@ -193,17 +189,11 @@ class MappedLog:
     records: tuple[CsvRecord, ...] | BadLogError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Line:
-    number: int
-    cells: _Row
-
-
 def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[MappedLog]:
     """The logs in a file, one a participant and study; `BadLogError` if it is no such table."""
-    every = list(_lines(content, mapping))
+    every = list(separated_lines(content, mapping.text, mapping.named))
     lines = [line for line in every if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)]
-    people: dict[tuple[str | None, str], list[_Line]] = {}
+    people: dict[tuple[str | None, str], list[SeparatedLine]] = {}
     nobodys: list[BadLogError] = []
     for line in lines:
         study = line.cells[mapping.columns.study] if mapping.columns.study else None
@@ -244,7 +234,7 @@ _SHOWN = 5
 """So many lines are named in a message."""
 
 
-def _code(line: _Line, file_name: str, mapping: ColumnMap) -> str:
+def _code(line: SeparatedLine, file_name: str, mapping: ColumnMap) -> str:
     """The participant of a row."""
     column = mapping.participant.column
     text = file_name if column is None else line.cells[column]
@@ -257,55 +247,16 @@ def is_recoils(content: bytes) -> bool:
     return any({one.name for one in table if one.required} <= header for table in tables.TABLES.values())
 
 
-def _records_or_fault(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...] | BadLogError:
+def _records_or_fault(
+    code: str, lines: Sequence[SeparatedLine], mapping: ColumnMap
+) -> tuple[CsvRecord, ...] | BadLogError:
     try:
         return _records(code, lines, mapping)
     except BadLogError as bad:
         return bad
 
 
-def _lines(content: bytes, mapping: ColumnMap) -> Iterator[_Line]:
-    try:
-        text = content.decode(mapping.text.encoding)
-    except UnicodeDecodeError as error:
-        rule = f"(rule: {mapping.text.encoding} text, as the map says)"
-        raise BadLogError(
-            f"byte 0x{content[error.start]:02x} is not {mapping.text.encoding} {rule}",
-            content[: error.start].count(b"\n") + 1,
-        ) from error
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=mapping.text.delimiter, strict=True)
-    start = 1
-    try:
-        header = next(reader, [])
-        _check_header(header, mapping)
-        start = reader.line_num + 1
-        for cells in reader:
-            if any(cells):
-                yield _Line(number=start, cells=_cells(header, cells, start, mapping))
-            start = reader.line_num + 1
-    except csv.Error as error:
-        raise BadLogError(f"is not separated text: {error}", start) from error
-
-
-def _cells(header: list[str], cells: list[str], line: int, mapping: ColumnMap) -> _Row:
-    if len(cells) != len(header):
-        raise BadLogError(f"has {len(cells)} fields (rule: {len(header)}, as in the header)", line)
-    return {
-        name: tables.MISSING if cell.strip() in mapping.text.missing else cell.strip()
-        for name, cell in zip(header, cells, strict=True)
-    }
-
-
-def _check_header(header: list[str], mapping: ColumnMap) -> None:
-    named = [*mapping.columns.model_dump(exclude_none=True).values(), *(skip.column for skip in mapping.skip)]
-    for name in filter(None, [mapping.participant.column, *named]):
-        if name not in header:
-            raise BadLogError(f"column {name!r} is missing (rule: the map names it)", 1, name)
-        if header.count(name) > 1:
-            raise BadLogError(f"column {name!r} stands {header.count(name)} times in the header (rule: once)", 1, name)
-
-
-def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
+def _records(code: str, lines: Sequence[SeparatedLine], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
     if len(lines) > LONGEST_LOG:
         raise BadLogError(f"participant {code} has {len(lines):,} rows (rule: at most {LONGEST_LOG:,})")
@@ -322,7 +273,7 @@ def _records(code: str, lines: Sequence[_Line], mapping: ColumnMap) -> tuple[Csv
     )
 
 
-def _check_rated_once(rows: Sequence[_Row], lines: Sequence[_Line], mapping: ColumnMap) -> None:
+def _check_rated_once(rows: Sequence[_Row], lines: Sequence[SeparatedLine], mapping: ColumnMap) -> None:
     first: dict[str, int] = {}
     for row, line in zip(rows, lines, strict=True):
         if (before := first.setdefault(row["method"], line.number)) != line.number:
@@ -331,7 +282,7 @@ def _check_rated_once(rows: Sequence[_Row], lines: Sequence[_Line], mapping: Col
             raise BadLogError(message, line.number, mapping.columns.rating)
 
 
-def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
+def _common(code: str, line: SeparatedLine, mapping: ColumnMap) -> _Row:
     named = mapping.columns.model_dump(exclude_none=True)
     row = {name: line.cells[named[name]] for name in named if name in ("session", "set", "trial", "onset_utc")}
     row |= {name: tables.guard(line.cells[named[name]]) for name in named if name in ("flags", "note", "comment")}
@@ -344,7 +295,7 @@ def _common(code: str, line: _Line, mapping: ColumnMap) -> _Row:
     }
 
 
-def _trial(line: _Line, mapping: ColumnMap) -> _Row:
+def _trial(line: SeparatedLine, mapping: ColumnMap) -> _Row:
     direction = _translated(line, "direction", mapping)
     response = _translated(line, "response", mapping)
     time, own = _seconds(line, mapping), str(int(mapping.response_source != "experimenter"))
@@ -364,7 +315,7 @@ def _trial(line: _Line, mapping: ColumnMap) -> _Row:
 _TRUTHS = {"1": True, "1.0": True, "true": True, "0": False, "0.0": False, "false": False}
 
 
-def _check_correct(line: _Line, correct: str, because: str, mapping: ColumnMap) -> None:
+def _check_correct(line: SeparatedLine, correct: str, because: str, mapping: ColumnMap) -> None:
     """`BadLogError` if the other program said otherwise of an answer; of no answer it may say what it likes."""
     name = mapping.columns.correct
     cell = line.cells[name] if name else tables.MISSING
@@ -379,13 +330,13 @@ def _check_correct(line: _Line, correct: str, because: str, mapping: ColumnMap) 
         raise BadLogError(f"correct is {cell}, but {because} {rule}", line.number, name)
 
 
-def _instruction(line: _Line, mapping: ColumnMap) -> str:
+def _instruction(line: SeparatedLine, mapping: ColumnMap) -> str:
     """The instruction; one that the map does not name keeps its name."""
     cell = line.cells[mapping.columns.instruction] if mapping.columns.instruction else tables.MISSING
     return tables.guard(mapping.values.instruction.get(cell, cell))
 
 
-def _rating(line: _Line, mapping: ColumnMap) -> _Row:
+def _rating(line: SeparatedLine, mapping: ColumnMap) -> _Row:
     cell = _decimal(line, str(mapping.columns.rating), mapping)
     if mapping.rating is not None and (value := _number_in(cell)) is not None:
         scale = mapping.rating
@@ -399,7 +350,7 @@ def _rating(line: _Line, mapping: ColumnMap) -> _Row:
     return {"rating": cell, "rating_by": mapping.response_source if cell else tables.MISSING}
 
 
-def _translated(line: _Line, name: str, mapping: ColumnMap) -> str:
+def _translated(line: SeparatedLine, name: str, mapping: ColumnMap) -> str:
     """What a cell of the column means; `BadLogError` if the map does not say."""
     column, known = getattr(mapping.columns, name), getattr(mapping.values, name)
     cell = line.cells[column]
@@ -409,7 +360,7 @@ def _translated(line: _Line, name: str, mapping: ColumnMap) -> str:
     raise BadLogError(f"{cell!r} is not allowed {rule}", line.number, column)
 
 
-def _seconds(line: _Line, mapping: ColumnMap) -> str:
+def _seconds(line: SeparatedLine, mapping: ColumnMap) -> str:
     if mapping.columns.response_time is None or mapping.response_time is None:
         return tables.MISSING
     cell = _decimal(line, mapping.columns.response_time, mapping)
@@ -417,7 +368,7 @@ def _seconds(line: _Line, mapping: ColumnMap) -> str:
     return repr(value / 1000.0) if value is not None and mapping.response_time.unit == "ms" else cell
 
 
-def _decimal(line: _Line, column: str, mapping: ColumnMap) -> str:
+def _decimal(line: SeparatedLine, column: str, mapping: ColumnMap) -> str:
     """A cell's number with a decimal point. `BadLogError`: it has a comma, and the map does not say so."""
     cell = line.cells[column]
     if "," in cell and mapping.text.decimal == "." and _number_in(cell.replace(",", ".")) is not None:
