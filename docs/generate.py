@@ -35,7 +35,12 @@ SHIPPED = {
     "synthetic": "synthetic/direction.toml",
 }
 """The shipped file whose values are shown beside the defaults."""
-EXAMPLES_OF = {"columns": "examples/columns.toml", "rules": "examples/rules.toml", "requests": "examples/requests.toml"}
+EXAMPLES_OF = {
+    "columns": "examples/columns.toml",
+    "levels": "examples/levels.toml",
+    "rules": "examples/rules.toml",
+    "requests": "examples/requests.toml",
+}
 KINDS = {
     "design": "a study's design",
     "gun": "a gun and its rendering methods",
@@ -43,6 +48,7 @@ KINDS = {
     "synthetic": "simulated participants",
     "paper": "published numbers",
     "columns": "a map of another program's columns",
+    "levels": "a map of another program's answers at levels",
     "rules": "exclusions",
     "requests": "further tests and models",
     "codebook": "codes of free descriptions",

@@ -72,7 +72,7 @@ for commands in (app, export_commands, predictions.app):
     for one in commands.registered_commands:  # a summary that is given is wrapped; left to the library, it is cut
         one.short_help = ((one.callback and one.callback.__doc__) or "").partition("\n\n")[0]
 app.add_typer(export_commands, name="export")
-app.add_typer(predictions.app, name="fit", short_help="Fit a model: `percept` to a paper's rates, `times` to logs.")
+app.add_typer(predictions.app, name="fit", short_help="Fit a model to a paper's rates, to times or to answers.")
 
 
 def main() -> None:

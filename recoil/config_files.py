@@ -269,6 +269,7 @@ def schemas() -> dict[str, bytes]:
     """A JSON Schema of each kind of config, by file name: an editor that reads them completes and checks keys."""
     from analysis.logs.column_map import ColumnMap  # noqa: PLC0415 - the lab's own kinds come without the desk
     from analysis.logs.exclusions import Rules  # noqa: PLC0415
+    from analysis.logs.level_map import LevelMap  # noqa: PLC0415
     from analysis.paper.paper import Paper  # noqa: PLC0415
     from analysis.summary.remarks_coding import Codebook  # noqa: PLC0415
     from analysis.summary.requests import Requests  # noqa: PLC0415
@@ -280,6 +281,7 @@ def schemas() -> dict[str, bytes]:
         "study": StudyConfig,
         "paper": Paper,
         "columns": ColumnMap,
+        "levels": LevelMap,
         "rules": Rules,
         "codebook": Codebook,
         "requests": Requests,

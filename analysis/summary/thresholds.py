@@ -100,11 +100,21 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     found = Thresholds(factor=factor, share=share, guess=known, standard=standard)
     if why := _unordered(design, factor, share):
         return replace(found, reason=why)
-    answers = _Answers(design, name, factor, share, table)
-    if not len(answers.rows):
-        return replace(found, reason="nobody answered")
-    tracks = tuple(tracks_in(design, answers.conditions, answers.rows))
-    return _fitted(answers, replace(found, even=answers.even, tracks=tracks), everybody=everybody)
+    level = pd.to_numeric(table[factor], errors="coerce")
+    success = _successes(design, name, factor, share, table)
+    even = int((success.isna() & table[name].notna() & level.notna()).sum()) if share == "chosen" else 0
+    answers = LevelledAnswers(
+        rows=table.assign(level=level, success=success),
+        conditions=tuple(
+            one
+            for one, of in design.factors.items()
+            if len(of.all_levels) > 1 and one not in {factor, question.correct}
+        ),
+        design=design,
+    )
+    tracks = tuple(tracks_in(design, list(answers.conditions), answers.with_level))
+    falls = False if design.adapted or share == "chosen" else None  # low levels follow right answers: no sign of a fall
+    return fitted_thresholds(answers, replace(found, even=even, tracks=tracks), falls=falls, everybody=everybody)
 
 
 def numeric_factor(design: DesignConfig) -> str | None:
@@ -146,35 +156,37 @@ def _unordered(design: DesignConfig, factor: str, share: FittedShare) -> str:
     return ""
 
 
-class _Answers:
-    """The rows that count, with their `level` and `success`, by condition and person."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LevelledAnswers:
+    """Trials with their `participant_id`, `level` and `success` (NaN: none), and the columns that make conditions.
 
-    def __init__(self, design: DesignConfig, name: str, factor: str, share: FittedShare, table: pd.DataFrame) -> None:
-        question = design.questions[name]
-        self.design, self.factor = design, factor
-        self.conditions = [
-            one
-            for one, of in design.factors.items()
-            if len(of.all_levels) > 1 and one not in {factor, question.correct}
-        ]
-        level = pd.to_numeric(table[factor], errors="coerce")
-        success = _successes(design, name, factor, share, table)
-        rows = table.assign(level=level, success=success)
-        self.even = int((success.isna() & table[name].notna() & level.notna()).sum()) if share == "chosen" else 0
-        rows = rows[rows["success"].notna()]
-        self.rows = rows[rows["level"].notna()]
-        self.catch = rows[rows["level"].isna()]
+    `design`: which they are of, if they are of one.
+    """
+
+    rows: pd.DataFrame
+    conditions: tuple[str, ...]
+    design: DesignConfig | None = None
+
+    @property
+    def with_level(self) -> pd.DataFrame:
+        """The answered rows with a level."""
+        return self.rows[self.rows["success"].notna() & self.rows["level"].notna()]
+
+    @property
+    def catch(self) -> pd.DataFrame:
+        """The answered rows without a stimulus."""
+        return self.rows[self.rows["success"].notna() & self.rows["level"].isna()]
 
     @property
     def could_be_met(self) -> FloatArray:
         """The levels that a procedure could choose, which answers have no part in; else those that were met."""
-        chosen = _numbers(self.design.factors[self.factor].all_levels) if self.design.adapted else self.rows["level"]
-        return np.asarray(chosen, dtype=np.float64)
+        if self.design is None or not self.design.adapted:
+            return self.with_level["level"].to_numpy(dtype=np.float64)
+        return np.array(_numbers(self.design.factors[self.design.adapted[0]].all_levels))
 
     def of_people(self, codes: Sequence[Hashable]) -> Iterator[tuple[dict[str, Level], list[PersonFit]]]:
         """The people in each condition, in the order of their codes; whoever has no trial in it is not there."""
-        mine = self.rows[self.rows["participant_id"].isin(codes)]
-        without = self.catch[self.catch["participant_id"].isin(codes)]
+        mine, without = (some[some["participant_id"].isin(codes)] for some in (self.with_level, self.catch))
         for levels, rows in _by_condition(mine, self.conditions):
             catch = without
             for column, level in levels.items():
@@ -224,8 +236,13 @@ def _person(who: str, rows: pd.DataFrame, catch: pd.DataFrame) -> PersonFit:
     return PersonFit(participant=who, points=_points(rows), catch=without)
 
 
-def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresholds:
-    rows = answers.rows
+def fitted_thresholds(
+    answers: LevelledAnswers, found: Thresholds, *, falls: bool | None, everybody: bool = False
+) -> Thresholds:
+    """The functions of some answers; `falls`: whether successes become fewer with the level, `None` to find out."""
+    rows = answers.with_level
+    if not len(rows):
+        return replace(found, reason="nobody answered")
     codes = sorted(rows["participant_id"].unique(), key=str)
     pooled = dict(_pooled(answers))
     most = len(codes) if everybody else max(1, min(MOST_FITTED, MOST_FITS // len(pooled)))
@@ -235,8 +252,7 @@ def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresho
     levels = rows["level"].to_numpy(dtype=np.float64)
     if np.unique(levels).size < 2:
         return replace(found, people=len(codes), reason="the answers are all at one level")
-    asked = found.share != "chosen" and not answers.design.adapted  # low levels follow right answers: no sign of a fall
-    falling = asked and _falls(levels, rows["success"].to_numpy(dtype=np.float64))
+    falling = _falls(levels, rows["success"].to_numpy(dtype=np.float64)) if falls is None else falls
     met = answers.could_be_met
     priors = priors_of(answers.design, -met if falling else met)
     span, conditions = (float(met.min()), float(met.max())), []
@@ -255,18 +271,18 @@ def _fitted(answers: _Answers, found: Thresholds, *, everybody: bool) -> Thresho
     )
 
 
-def has_own_priors(design: DesignConfig) -> bool:
+def has_own_priors(design: DesignConfig | None) -> bool:
     """Whether a design says what it thinks of the width and of lapses: its procedure's levels rest on that."""
-    return isinstance(design.adaptive, PosteriorConfig) and len(design.adapted) == 1
+    return design is not None and isinstance(design.adaptive, PosteriorConfig) and len(design.adapted) == 1
 
 
-def priors_of(design: DesignConfig, levels: FloatArray) -> Priors:
+def priors_of(design: DesignConfig | None, levels: FloatArray) -> Priors:
     """Psignifit's priors; width and lapse rate as the design's procedure takes them, where it says so.
 
     A procedure that measures a threshold learns little of either, so that the fit rests on what is thought of them.
     The threshold's stays flat, so that people can be pooled. Of the logarithm a width is no width of the level.
     """
-    priors, table = default_priors(levels), design.adaptive
+    priors, table = default_priors(levels), None if design is None else design.adaptive
     if not isinstance(table, PosteriorConfig) or not has_own_priors(design):
         return priors
     lapse = ListedPrior(values=table.lapse.values, weights=table.lapse.weights)
@@ -275,8 +291,8 @@ def priors_of(design: DesignConfig, levels: FloatArray) -> Priors:
     return replace(priors, lapse=lapse, width=ListedPrior(values=table.width.values, weights=table.width.weights))
 
 
-def _pooled(answers: _Answers) -> Iterator[tuple[tuple[tuple[str, Level], ...], tuple[ShareAtLevel, ...]]]:
-    for levels, rows in _by_condition(answers.rows, answers.conditions):
+def _pooled(answers: LevelledAnswers) -> Iterator[tuple[tuple[tuple[str, Level], ...], tuple[ShareAtLevel, ...]]]:
+    for levels, rows in _by_condition(answers.with_level, answers.conditions):
         yield tuple(levels.items()), _points(rows)
 
 

@@ -183,7 +183,8 @@ app = typer.Typer(
     cls=_PerceptUnlessNamed,
     help=(
         "Fit a model: `percept` (what of a shot says its direction, to a paper's rates; also what `recoil fit` alone "
-        "does) or `times` (how fast and how carefully people decide, to logs with their own response times)."
+        "does), `times` (how fast and how carefully people decide, to logs with their own response times) or "
+        "`thresholds` (psychometric functions, to another program's answers)."
     ),
     rich_markup_mode=None,
 )
@@ -227,6 +228,33 @@ def percept(
     found = feature.percept(request, out, terminal.progress)
     text = "\n".join(map(terminal.in_text, feature.in_short(found)))
     terminal.show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
+
+
+@app.command("thresholds")
+def fit_thresholds(
+    answers: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Files of another program, or folders.")],
+    columns: Annotated[
+        Path | None,
+        typer.Option(metavar="MAP.toml", help="Which columns hold level and success; required.", show_default=False),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-thresholds"),
+    as_json: terminal.AsJsonOption = False,
+) -> None:
+    """Psychometric functions of another program's answers at levels of a stimulus."""
+    from analysis.summary import mapped_thresholds as feature
+    from experiments.config.door import ConfigError
+
+    if columns is None:
+        raise ConfigError(
+            "fit thresholds: give --columns MAP.toml, which says what columns hold; `recoil configs --copy DIR` has "
+            "examples/levels.toml. Recoil's own logs are fitted by `recoil analyze`"
+        )
+    found = feature.mapped_thresholds(answers, columns, out)
+    for line in few_of_each([f"left out: {one}" for one in found.problems]):
+        terminal.say(f"recoil: {line}")
+    short = terminal.in_text(feature.thresholds_in_short(found))
+    terminal.show(found, f"{short}\nReport: {out / 'report.html'}", as_json)
+    raise terminal.end(exceptions=bool(found.problems))
 
 
 @app.command()

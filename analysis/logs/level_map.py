@@ -1,0 +1,153 @@
+"""Answers of other programs at levels of a stimulus, by a map (`recoil fit thresholds --columns MAP.toml`).
+
+A file has a row a trial. `configs/examples/levels.toml` shows every key of such a map: which column holds the level,
+which whether the answer was a success (right, or yes), and what makes conditions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import pandas as pd
+from pydantic import Field, model_validator
+
+from analysis.logs.column_map import Skip
+from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
+from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
+from analysis.logs.separated import SeparatedLine, TextFormat, separated_lines
+from experiments.config.door import Model
+from experiments.design.language import ColumnName
+from experiments.record import tables
+
+_TRUTHS = {"1": True, "1.0": True, "true": True, "yes": True, "0": False, "0.0": False, "false": False, "no": False}
+
+
+class LevelColumns(Model):
+    """The names of the columns: of the level, the success, and, where there are several conditions, of these."""
+
+    level: ShortText
+    success: ShortText
+    condition: ShortText | None = None
+
+
+class LevelValues(Model):
+    """What cells mean."""
+
+    participant: dict[str, str] = Field(default_factory=dict)
+    success: dict[str, bool] = Field(default_factory=dict)
+    condition: dict[str, str] = Field(default_factory=dict)
+
+
+class LevelMap(Model):
+    """A whole map. `name` is the level's, with its unit; `answers`: of right ones, among how many who guesses chooses.
+
+    `falling`: successes become fewer the higher the level.
+    """
+
+    name: ColumnName
+    share: Literal["right", "yes"]
+    answers: Annotated[int, Field(ge=2, le=100)] | None = None
+    falling: bool = False
+    files_end_with: Annotated[tuple[ShortText, ...], Field(min_length=1)] = (".csv",)
+    text: TextFormat = TextFormat()
+    participant: ParticipantMapping
+    columns: LevelColumns
+    values: LevelValues = LevelValues()
+    skip: tuple[Skip, ...] = ()
+
+    @model_validator(mode="after")
+    def _chance_is_known_of_right_answers(self) -> Self:
+        if self.share == "right" and self.answers is None:
+            raise ValueError("answers is missing: of right answers say among how many who guesses chooses, such as 2")
+        if self.share == "yes" and self.answers is not None:
+            raise ValueError('answers is of share = "right": of yes the guess rate is fitted; remove it')
+        return self
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Every column of a file that the map names."""
+        named = [*self.columns.model_dump(exclude_none=True).values(), *(skip.column for skip in self.skip)]
+        return tuple(filter(None, [self.participant.column, *named]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MappedLevels:
+    """The rows of all good files: `participant_id`, `level` (NaN without a stimulus), `success` and `condition`."""
+
+    table: pd.DataFrame
+    files: tuple[Path, ...]
+    problems: tuple[Problem, ...]
+
+
+def read_levels(paths: Sequence[Path], mapping: LevelMap) -> MappedLevels:
+    """The answers in `paths`, files or folders. A file that breaks a rule is a problem, and left out whole."""
+    found = find_logs(list(paths), mapping.files_end_with)
+    rows, files, problems = list[dict[str, object]](), list[Path](), list(found.problems)
+    for path in map(Path, found.logs):
+        try:
+            content = read_content(str(path))
+            check_length(content, LONGEST_MAPPED)
+            rows += _rows(content, path.name, mapping)
+            files.append(path)
+        except BadLogError as bad:
+            problems.append(bad.of(path, "", "", ""))
+    names = ["participant_id", "level", "success", "condition"]
+    return MappedLevels(table=pd.DataFrame(rows, columns=names), files=tuple(files), problems=tuple(problems))
+
+
+def _rows(content: bytes, file_name: str, mapping: LevelMap) -> list[dict[str, object]]:
+    lines = [
+        line
+        for line in separated_lines(content, mapping.text, mapping.named)
+        if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)
+    ]
+    if not lines:
+        raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
+    return list(_answered(lines, file_name, mapping))
+
+
+def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap) -> Iterator[dict[str, object]]:
+    """Rows with an answer; whoever did not answer tells nothing."""
+    where, columns = mapping.participant, mapping.columns
+    for line in lines:
+        text = file_name if where.column is None else line.cells[where.column]
+        code = code_in(text, where, mapping.values.participant, line.number)
+        check_person(code, where, line.number, ())
+        success = _success(line, columns.success, mapping.values.success)
+        if success is None:
+            continue
+        condition = line.cells[columns.condition] if columns.condition else tables.MISSING
+        yield {
+            "participant_id": code,
+            "level": _level(line, mapping),
+            "success": float(success),
+            "condition": mapping.values.condition.get(condition, condition) or None,
+        }
+
+
+def _success(line: SeparatedLine, column: str, known: Mapping[str, bool]) -> bool | None:
+    cell = line.cells[column]
+    if not cell:
+        return None
+    said = known.get(cell, _TRUTHS.get(cell.lower()))
+    if said is None:
+        rule = "(rule: 1 or 0, true or false, yes or no; values.success says what others mean)"
+        raise BadLogError(f"{cell!r} is no success and no failure {rule}", line.number, column)
+    return said
+
+
+def _level(line: SeparatedLine, mapping: LevelMap) -> float:
+    """The level; NaN of an empty cell, a trial without a stimulus."""
+    column = mapping.columns.level
+    cell = line.cells[column]
+    try:
+        level = float(cell.replace(mapping.text.decimal, ".")) if cell else math.nan
+    except ValueError:
+        level = math.inf
+    if math.isinf(level):
+        raise BadLogError(f"{cell!r} is no level (rule: a number, text.decimal as its mark)", line.number, column)
+    return level

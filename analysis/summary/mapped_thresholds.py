@@ -1,0 +1,109 @@
+"""Psychometric functions of another program's answers: what a map names, fitted and shown as in a report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.logs.files import Problem, shown_name
+from analysis.logs.level_map import LevelMap, MappedLevels, read_levels
+from analysis.report.labels import labelled
+from analysis.report.page import write_page
+from analysis.report.section import Section, origin_table
+from analysis.report.serial import UNWRITTEN, NotebookResult, as_json, plain
+from analysis.summary.figures.functions import figure_functions
+from analysis.summary.question_results import QuestionSummary
+from analysis.summary.results import DesignSummary, Origin
+from analysis.summary.sections.pictures import functions_figure_of
+from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
+from analysis.summary.thresholds import LevelledAnswers, Thresholds, fitted_thresholds
+from experiments.config.door import load
+from experiments.config.setup import sha256
+from experiments.record import storage
+from experiments.record.provenance import provenance
+from experiments.study.folders import PlaceError
+
+_NAME, _ASKED = "thresholds", "success"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MappedThresholds(NotebookResult):
+    """The content of `fit.json`: the functions, from which files, read by which map; and what was left out."""
+
+    files: tuple[str, ...]
+    thresholds: Thresholds
+    provenance: dict[str, str]
+    problems: tuple[Problem, ...] = field(default=(), metadata=UNWRITTEN)
+
+    def rows(self) -> list[dict[str, object]]:
+        """A row a person and condition."""
+        return [
+            {**condition.levels, "participant": one.participant, "trials": one.trials, "reason": one.reason}
+            | ({} if one.fit is None else {"threshold": plain(one.fit.threshold)["median"]})
+            for condition in self.thresholds.conditions
+            for one in condition.people
+        ]
+
+    @property
+    def summary(self) -> DesignSummary:
+        """The same as the report's sections take it."""
+        asked = QuestionSummary(kind="choice", cells=(), tests=(), thresholds=self.thresholds)
+        people = self.thresholds.people
+        origin = Origin(answers={}, guns={})
+        return DesignSummary(
+            title="Another program's answers", n=people, factors={}, questions={_ASKED: asked}, origin=origin
+        )
+
+
+def mapped_thresholds(paths: list[Path], columns: Path, out: Path) -> MappedThresholds:
+    """Fit, and write `fit.json`, report and figure into `out`.
+
+    `ConfigError`: a map that is none. `PlaceError`: no usable file, or no function; with the reasons.
+    """
+    mapping = load(LevelMap, columns)
+    read = read_levels(paths, mapping)
+    if not read.files:
+        raise PlaceError("\n".join([f"no usable file in {', '.join(map(str, paths))}", *map(str, read.problems)]))
+    found = MappedThresholds(
+        files=tuple(map(shown_name, read.files)),
+        thresholds=_fitted(read, mapping),
+        provenance=provenance() | {"read by": f"{columns.name}, sha256 {sha256(mapping.model_dump(mode='json'))}"},
+        problems=read.problems,
+    )
+    if found.thresholds.reason:
+        raise PlaceError(f"no psychometric function: {found.thresholds.reason}")
+    storage.make_folder(out)
+    storage.write_whole(out / "fit.json", as_json(found))
+    with labelled({}):
+        write_page(out, "Psychometric functions of another program's answers", tuple(_sections(found, out / "figures")))
+    return found
+
+
+def _fitted(read: MappedLevels, mapping: LevelMap) -> Thresholds:
+    named = mapping.columns.condition is not None
+    return fitted_thresholds(
+        LevelledAnswers(rows=read.table, conditions=("condition",) if named else ()),
+        Thresholds(factor=mapping.name, share=mapping.share, guess=1 / mapping.answers if mapping.answers else None),
+        falls=mapping.falling,
+        everybody=True,
+    )
+
+
+def thresholds_in_short(found: MappedThresholds) -> Section:
+    """The group's threshold, or one person's."""
+    summary = found.summary
+    items = tuple(threshold_sentences(summary, summary.questions[_ASKED]))
+    return Section(
+        title=f"{found.thresholds.people} participants", items=items or ("One participant: see the report.",)
+    )
+
+
+def _sections(found: MappedThresholds, figures: Path) -> Iterator[Section]:
+    figure_functions(found.summary, found.thresholds, figures / functions_figure_of(_NAME, _ASKED))
+    yield thresholds_in_short(found)
+    yield from threshold_sections(_NAME, found.summary)
+    if found.problems:
+        yield Section(title="Left out", items=tuple(map(str, found.problems)))
+    yield Section(title="Files", items=found.files)
+    yield Section(title="Provenance", tables=(origin_table(found.provenance),))

@@ -1,0 +1,103 @@
+"""Another program's answers at levels, read by a map: the same functions as of the numbers themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analysis.logs.level_map import LevelMap, read_levels
+from analysis.psychometric.fit import psychometric_fit
+from analysis.summary.mapped_thresholds import mapped_thresholds
+from experiments.config.door import ConfigError, load
+from experiments.load import shipped_folder
+from experiments.study.folders import PlaceError
+
+MAP = """
+name = "voltage_V"
+share = "right"
+answers = 2
+[text]
+delimiter = ";"
+decimal = ","
+[participant]
+column = "VP"
+pattern = 'VP_(\\d+)'
+[columns]
+level = "Reiz"
+success = "Treffer"
+condition = "Hand"
+[values.success]
+ja = true
+nein = false
+"""
+RIGHT = {6.5: 10, 8.5: 12, 10.5: 15, 12.5: 19, 14.5: 20}
+HANDS = ("links", "rechts")
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    """Two people with the same answers at both hands, the levels in no order, and a trial nobody answered."""
+    rows = [
+        f"VP_0{who};{str(level).replace('.', ',')};{'ja' if trial < right else 'nein'};{hand}"
+        for trial in range(20)
+        for level, right in RIGHT.items()
+        for who in (1, 2)
+        for hand in HANDS
+    ]
+    (tmp_path / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *rows, "VP_01;6,5;;links"]) + "\n")
+    (tmp_path / "map.toml").write_text(MAP)
+    return tmp_path
+
+
+def test_a_map_gives_the_fits_of_the_counts_themselves(lab: Path) -> None:
+    found = mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")
+    own = psychometric_fit([*RIGHT], [*RIGHT.values()], [20] * 5, guess=0.5)
+    assert [one.levels for one in found.thresholds.conditions] == [{"condition": hand} for hand in HANDS]
+    people = [one for condition in found.thresholds.conditions for one in condition.people]
+    assert [one.participant for one in people] == ["01", "02", "01", "02"]
+    assert {one.fit.threshold.median for one in people if one.fit is not None} == {own.threshold.median}
+    assert {path.name for path in (lab / "out").iterdir()} >= {"fit.json", "report.html", "figures"}
+    assert found.to_frame()["threshold"].nunique() == 1
+
+
+def test_a_level_that_is_not_there_is_a_trial_without_a_stimulus(lab: Path) -> None:
+    (lab / "lab.csv").write_text("VP;Reiz;Treffer;Hand\nVP_01;;nein;links\nVP_01;6,5;ja;links\n")
+    read = read_levels([lab / "lab.csv"], load(LevelMap, lab / "map.toml"))
+    assert read.table["level"].isna().tolist() == [True, False]
+    assert read.table["success"].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("ja = true", "", "lab.csv, line 2, column Treffer: 'ja' is no success and no failure"),
+        ('"Reiz"', '"Hand"', "lab.csv, line 2, column Hand: 'links' is no level"),
+        ('"Reiz"', '"Pegel"', "column 'Pegel' is missing (rule: the map names it)"),
+        ("VP_(", "P-(", "'VP_01' has no participant's code"),
+    ],
+)
+def test_what_a_map_does_not_fit_is_said_with_file_line_and_column(lab: Path, old: str, new: str, words: str) -> None:
+    (lab / "map.toml").write_text(MAP.replace(old, new))
+    with pytest.raises(PlaceError) as refused:
+        mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("answers = 2", "", "answers is missing: of right answers say among how many"),
+        ('share = "right"', 'share = "yes"', 'answers is of share = "right"'),
+        ('name = "voltage_V"', 'name = "voltage V"', "name = 'voltage V': must be a letter and up to 31 letters"),
+    ],
+)
+def test_a_map_that_is_none_is_refused(lab: Path, old: str, new: str, words: str) -> None:
+    (lab / "map.toml").write_text(MAP.replace(old, new))
+    with pytest.raises(ConfigError) as refused:
+        load(LevelMap, lab / "map.toml")
+    assert words in str(refused.value)
+
+
+def test_the_shipped_example_is_a_map() -> None:
+    assert load(LevelMap, shipped_folder() / "examples" / "levels.toml").values.success == {"hit": True, "miss": False}
