@@ -245,14 +245,14 @@ BROKEN = {
     ),
     "grain that does not divide": Broken(
         PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 0.3 ",
-        ("questions.rating: grain 0.3 does not divide the scale",), "[questions.rating]",
+        ("questions.rating.grain 0.3 does not divide the scale",), "grain = ",
     ),
     "grain beyond all doubles": Broken(
         PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 1e-320 ", ("questions.rating.grain = 1e-320",), "grain = "
     ),
     "scale upside down": Broken(
         PREFERENCE, PREFERENCE, "minimum = 0.0", "minimum = 11.0",
-        ("questions.rating: minimum 11 and maximum 10: need -1e6 <= minimum < maximum <= 1e6",), "[questions.rating]",
+        ("questions.rating.minimum 11 and maximum 10: need -1e6 <= minimum < maximum <= 1e6",), "minimum = ",
     ),
     "repeat faster than the magnet is home": Broken(
         PREFERENCE, PREFERENCE, "repeat_every_s = 1.0", "repeat_every_s = 0.2",
@@ -265,7 +265,7 @@ BROKEN = {
     "unknown law": Broken(
         DIRECTION, ANSWERING, 'law = "rates"', 'law = "rating"',
         ("questions.response", "'rating'", "is none of rates, shares"),
-        "[questions.response]",
+        "law = ",
     ),
     "law of another kind of question": Broken(
         PREFERENCE, RATING, 'law = "words"', 'law = "worth"\nfactor = "method"\nworth = { vibration = 1.0 }',
