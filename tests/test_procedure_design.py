@@ -13,7 +13,7 @@ from analysis.predict.check_design import check_design
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of, practice_of
-from experiments.design.procedures.choosing import posterior_rule
+from experiments.design.procedures.choosing import ChosenLevels, posterior_rule, tracks_of_cell
 from experiments.design.procedures.config import PosteriorConfig
 from experiments.design.procedures.in_words import rule_words
 from experiments.load import load_setup, shipped_folder
@@ -64,15 +64,19 @@ REFUSED = [
     (OTHER, {"procedure": {"trials": None}}, "procedure.trials: is missing"),
     (OTHER, {"procedure": {"least_trials": 60}}, "least_trials = 60 is more than trials = 50"),
     (OTHER, {"factors": {"pulse_s": {"levels": [0.002, 0.006, 0.008]}}}, "need them at even distances"),
-    (ONE, {"procedure": {"start": 3.0}}, "start = 3 is excluded by the prior of the threshold, 4 to 20"),
-    (ONE, {"procedure": {"threshold": {"mean": 30.0, "sd": 2.0}}}, "mean = 30 is outside of 4 to 20"),
+    (ONE, {"procedure": {"start": 1.0}}, "start = 1 is excluded by the prior of the threshold, 2 to 24"),
+    (ONE, {"procedure": {"threshold": {"mean": 30.0, "sd": 2.0}}}, "mean = 30 is outside of 2 to 24"),
     (ONE, {"procedure": {"threshold": {"mean": 10.1, "sd": 1e-9}}}, "less than half the distance of the values, 0.25"),
     (ONE, {"procedure": {"threshold": {"minimum": 20.0, "maximum": 4.0}}}, "threshold.minimum = 20 is above maximum"),
     (ONE, {"procedure": {"threshold": {"points": 1}}}, "threshold.points = 1 is one value, which has minimum"),
-    (ONE, {"procedure": {"threshold": {"maximum": 2e8}}}, "has one value only among the levels of voltage_V, 4 to 20"),
+    (
+        ONE,
+        {"procedure": {"threshold": {"minimum": 4.0, "maximum": 2e8}}},
+        "has one value only among the levels of voltage_V, 4 to 20",
+    ),
     (ONE, {"procedure": {"width": {"minimum": 1e-300}}}, "procedure.width.minimum = 1e-300 is less than a 100th of"),
     (ONE, {"procedure": {"width": {"maximum": 1e300}}}, "procedure.width.maximum = 1e+300 is more than 100 times the"),
-    (ONE, {"procedure": {"credible_width": 16.0}}, "procedure.credible_width = 16: the interval of the prior is 15.44"),
+    (ONE, {"procedure": {"credible_width": 22.0}}, "procedure.credible_width = 22: the interval of the prior is 21.14"),
     (ONE, {"procedure": {"credible_width": 1e-9}}, "too far apart for an interval narrower than 0.2375"),
     (ONE, {"procedure": {"lapse_either_way": True}}, "procedure.lapse_either_way: of 0.5 right by chance"),
     (OTHER, {"procedure": {"steps": [0.01]}}, "procedure.steps: 0.01 goes through all of pulse_s, 0.001 to 0.01"),
@@ -128,6 +132,19 @@ def test_lapses_of_yes_and_no_go_either_way_where_the_design_says_so() -> None:
     known = posterior_rule(table, [(4.0, 20.0)], 0.0).grid
     assert known.chance.tolist() == table.lapse.values.tolist()
     assert "lapse rate 0 to 0.08, lapses either way)" in rule_words(table, [(4.0, 20.0)])
+
+
+@pytest.mark.parametrize(("right", "end"), [(False, 20.0), (True, 4.0)])
+def test_who_is_never_right_or_always_is_led_to_an_end_of_the_levels_and_the_journal_says_so(
+    right: bool, end: float
+) -> None:
+    table = THRESHOLD.config.adaptive
+    assert table is not None
+    levels = tuple(float(level) for level in THRESHOLD.config.factors["voltage_V"].all_levels)
+    track = tracks_of_cell(table, [levels], 0.5)[0]
+    while not track.over:
+        track, last = track.after(track.choice().levels, success=right), track.choice()
+    assert last == ChosenLevels(levels=(end,), at_edge=True)
 
 
 def test_a_message_about_a_key_of_the_procedure_has_that_key_and_its_line() -> None:
