@@ -120,8 +120,8 @@ REFUSED = {
         ALL_BOUNDARIES, "neutral = 0.0", f"{DIFFUSION}.boundaries.neutral = 0.0", "must be above 0", at="boundaries ="
     ),
     "no neutral boundary": of_a_law(
-        ALL_BOUNDARIES, "speed = 1.0", f"{DIFFUSION}: boundaries has no value for neutral", "give one",
-        at="[questions.response.diffusion]",
+        ALL_BOUNDARIES, "speed = 1.0", f"{DIFFUSION}.boundaries has no value for neutral", "give one",
+        at="boundaries = ",
     ),
     "negative time": of_a_law(
         "non_decision_s = 0.35", "non_decision_s = -0.1", f"{DIFFUSION}.non_decision_s = -0.1", "must be at least 0"
@@ -131,7 +131,7 @@ REFUSED = {
     ),
     "lapses backward": of_a_law(
         "earliest_s = 0.2, latest_s = 3.0", "earliest_s = 3.0, latest_s = 0.2",
-        f"{DIFFUSION}.lapses: earliest_s = 3 must be below latest_s = 0.2",
+        f"{DIFFUSION}.lapses.earliest_s = 3 must be below latest_s = 0.2",
     ),
     "people of no spread": of_a_law(
         "log_boundary_sd = 0.0", "log_boundary_sd = -0.1", f"{PEOPLE}.log_boundary_sd = -0.1", "must be at least 0"
@@ -154,7 +154,7 @@ REFUSED = {
     ),
     "words of no instruction": Broken(
         HURRY, HURRY, "texts.accuracy", "texts.care",
-        ("factors.instruction: texts has 'care', which is no level", "accuracy, neutral, speed"),
+        ("factors.instruction.texts has 'care', which is no level", "accuracy, neutral, speed"),
         "[factors.instruction]",
     ),
     "an empty text": Broken(
