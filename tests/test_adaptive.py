@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
 from experiments.design.planning import plan_of
 from experiments.rebuild import table
@@ -103,6 +104,15 @@ def test_a_run_that_is_killed_and_resumed_feels_what_the_unbroken_one_felt(tmp_p
     kills, rows = killed_until_done(tmp_path / "killed", random.Random(1), 3)
     assert kills == 3
     assert rows == unbroken(tmp_path / "unbroken")
+
+
+def test_logs_of_another_procedure_are_left_out_as_their_levels_rest_on_other_priors(tmp_path: Path) -> None:
+    for place, kind in enumerate(("posterior", "posterior", "posterior-ends"), start=1):
+        request = replace(_request(SETUPS[kind], tmp_path), participant_id=f"P0{place}")
+        run(request, synthetic_screen, VirtualClock())
+    (problem,) = read_logs([tmp_path]).problems
+    assert problem.participant == "P03"
+    assert "was made with another design 'threshold'" in problem.message
 
 
 def test_rows_that_a_track_did_not_need_are_marked(tmp_path: Path) -> None:

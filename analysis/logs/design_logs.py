@@ -86,7 +86,7 @@ def _design_of(path: str) -> tuple[bytes, DesignConfig, Head]:
 
 
 def _key(design: DesignConfig) -> str:
-    parts = {"factors", "order", "trial", "questions", "table"}
+    parts = {"factors", "order", "procedure", "trial", "questions", "table"}
     return sha256(design.model_dump(mode="json", include=parts))
 
 

@@ -233,7 +233,7 @@ def _by_design(reading: LogsSoFar, logs: Mapping[int, DesignLog], studies: Mappi
             path = reading.paths.pop(number // LOGS_A_FILE)
             message = (
                 f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
-                "trial or questions differ); analyse it apart"
+                "procedure, trial or questions differ); analyse it apart"
             )
             study = reading.studies[number]
             reading.problems.append(BadLogError(message).of(Path(path), log.code, log.design.design, study))
