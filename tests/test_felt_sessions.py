@@ -30,6 +30,7 @@ from experiments.synthetic.percept import Percept, evidence, forward_rates, perc
 from experiments.synthetic.preference import feelings, felt_ratings
 from tests.conftest import Recoil
 from tests.designs import merged
+from tests.felt_thresholds import VOLTAGES, Somebody, shares_right, voltage_at, whole_session, whole_setup
 from tests.other_trials import with_levels
 
 HURRY = shipped_folder() / "examples" / "hurry.toml"
@@ -336,3 +337,13 @@ def test_a_check_of_the_example_has_the_words_that_are_read_out(recoil: Recoil) 
     said = " ".join(recoil("check", HURRY).stdout.split())
     for text in load_setup(str(HURRY)).config.factors["instruction"].texts.values():
         assert text in said
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_an_adaptive_session_brackets_the_voltage_that_the_percept_gives(seed: int, tmp_path: Path) -> None:
+    """`make soak` has 500 of them (gun_threshold)."""
+    someone = Somebody("asymmetric-2", 0.213, 160)
+    fit, answers = whole_session(whole_setup(someone), tmp_path, seed)
+    low, _, high = voltage_at(fit, 0.75)
+    assert low <= np.interp(0.75, shares_right(someone), VOLTAGES) <= high
+    assert answers == someone.trials

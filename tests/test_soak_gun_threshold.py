@@ -4,63 +4,28 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import pandas as pd
 import pytest
-from scipy.special import logit, ndtri
 
 from analysis.paper.recurrence import wilson_interval
 from analysis.psychometric.fit import PsychometricFit, psychometric_fit
 from analysis.psychometric.priors import PlateauPrior, Priors
-from analysis.summary.thresholds import thresholds
-from device.methods import paper_methods
-from device.parameters import GunParameters
-from experiments.clock import VirtualClock
-from experiments.config.setup import Setup
-from experiments.design.config import DesignConfig
 from experiments.design.procedures.posterior import best_stimulus, parameter_grid, posterior_after, variance_rule
 from experiments.design.procedures.psychometric import share_felt
-from experiments.run import RunRequest, run
-from experiments.screens.synthetic import synthetic_screen
-from experiments.synthetic.diffusion import People
-from experiments.synthetic.laws import SyntheticAnswers
-from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percept_of
 from tests.conftest import Soak
-from tests.designs import changed
+from tests.felt_thresholds import VOLTAGES, Somebody, shares_right, voltage_at, whole_session, whole_setup
 
 pytestmark = pytest.mark.soak
 
 RUNS, WANTED = 500, 0.93
-VOLTAGES = np.arange(2.0, 24.01, 0.5)
 LAPSES = np.array([0.0, 0.02, 0.04, 0.06, 0.08])
 PRIORS = Priors(
     threshold=PlateauPrior(low=0.0, flat_from=2.0, flat_to=24.0, high=30.0),
     width=PlateauPrior(low=1.0, flat_from=3.0, flat_to=60.0, high=90.0),
 )
-
-
-@dataclass(frozen=True)
-class Somebody:
-    """A model-based participant who says which way a method's shot went, forward as often as backward."""
-
-    method: str
-    sensitivity: float
-    trials: int
-
-
-def shares_right(someone: Somebody) -> np.ndarray:
-    """How often they are right at each voltage: from the physics of the shot through the percept."""
-    gun = paper_methods()[someone.method]
-    assert isinstance(gun, GunParameters)
-    percept = PerceptParameters(sensitivity=someone.sensitivity)
-    felt = [percept_of(replace(gun, voltage_V=float(voltage)), percept.leak_s) for voltage in VOLTAGES]
-    log_odds = np.array([evidence(one, percept) for one in felt])
-    forward, backward = (forward_rates(sign * log_odds, percept.start, People()) for sign in (1, -1))
-    return np.asarray((forward + 1 - backward) / 2)
 
 
 def adaptive_runs(shares: np.ndarray, trials: int) -> tuple[np.ndarray, np.ndarray]:
@@ -88,14 +53,6 @@ def adaptive_runs(shares: np.ndarray, trials: int) -> tuple[np.ndarray, np.ndarr
 def fitted(given: np.ndarray, right: np.ndarray) -> PsychometricFit:
     shown = given > 0
     return psychometric_fit(VOLTAGES[shown], right[shown], given[shown], guess=0.5, shape="logistic", priors=PRIORS)
-
-
-def voltage_at(found: PsychometricFit, share: float) -> np.ndarray:
-    """The voltage with so many right answers, lapses included: its 95 % interval around the median."""
-    threshold, width, lapse, guess = found.draws.T[:4]
-    felt = np.clip((share - guess) / (1 - guess - lapse), 1e-9, 1 - 1e-9)
-    widths_off = ndtri(felt) / (2 * ndtri(0.95)) if found.shape == "normal" else logit(felt) / (2 * logit(0.95))
-    return np.quantile(threshold + width * widths_off, [0.025, 0.5, 0.975])
 
 
 @pytest.mark.parametrize(
@@ -137,17 +94,10 @@ def test_whole_sessions_bracket_the_voltage_of_three_in_four(memory: Path, soak:
     true = float(np.interp(0.75, shares_right(someone), VOLTAGES))
     setup, fits, rows = whole_setup(someone), list[PsychometricFit](), 0
     for seed in range(WHOLE):
-        folder = memory / str(seed)
-        done = run(
-            RunRequest(setup=setup, participant_id="P01", results=folder, seed=seed), synthetic_screen, VirtualClock()
-        )
-        table = pd.read_csv(done.place.table)
-        rows += int(table["response"].notna().sum())
-        assert done.place.journal.stat().st_size > 0
-        found = thresholds(setup.config, "response", table)
-        assert found is not None
-        fits += [one.fit for one in found.conditions[0].people if one.fit is not None]
-        shutil.rmtree(folder)
+        fit, answers = whole_session(setup, memory / str(seed), seed)
+        fits.append(fit)
+        rows += answers
+        shutil.rmtree(memory / str(seed))
     assert (len(fits), rows) == (WHOLE, WHOLE * someone.trials)
     starts, estimates, ends = np.array([voltage_at(found, 0.75) for found in fits]).T
     held = int(((starts <= true) & (true <= ends)).sum())
@@ -162,26 +112,6 @@ def test_whole_sessions_bracket_the_voltage_of_three_in_four(memory: Path, soak:
         f" {np.median(estimates) - true:+.2f} V, interval {np.median(ends - starts):.1f} V wide in the median",
     )
     assert held >= WANTED * WHOLE
-
-
-def whole_setup(someone: Somebody) -> Setup[DesignConfig]:
-    """The shipped threshold over 2 to 24 V, with priors as vague as the model's curve, answered from what is felt."""
-    setup = changed(
-        "threshold",
-        below_break_away=True,
-        factors={
-            "method": {"levels": (someone.method,)},
-            "voltage_V": {"levels": {"minimum": 2.0, "maximum": 24.0, "grain": 0.5}},
-        },
-        procedure={
-            "trials": someone.trials // 2,
-            "threshold": {"minimum": 0.0, "maximum": 30.0, "points": 61},
-            "width": {"minimum": 3.0, "maximum": 80.0, "points": 20},
-        },
-        timing={"planned_s": 3000.0},
-    )
-    felt = {"law": "diffusion", "percept": {"sensitivity": someone.sensitivity}}
-    return replace(setup, laws=SyntheticAnswers.model_validate({"questions": {"response": felt}}))
 
 
 @pytest.fixture
