@@ -8,7 +8,7 @@ import pytest
 
 from analysis.logs.level_map import LevelMap, read_levels
 from analysis.psychometric.fit import psychometric_fit
-from analysis.summary.mapped_thresholds import mapped_thresholds
+from analysis.summary.mapped_thresholds import mapped_thresholds, thresholds_in_short
 from experiments.config.door import ConfigError, load
 from experiments.load import shipped_folder
 from experiments.study.folders import PlaceError
@@ -59,6 +59,13 @@ def test_a_map_gives_the_fits_of_the_counts_themselves(lab: Path) -> None:
     assert {one.fit.threshold.median for one in people if one.fit is not None} == {own.threshold.median}
     assert {path.name for path in (lab / "out").iterdir()} >= {"fit.json", "report.html", "figures"}
     assert found.to_frame()["threshold"].nunique() == 1
+
+
+def test_where_nobody_has_a_threshold_among_the_levels_no_mean_is_told(lab: Path) -> None:
+    rows = [f"VP_0{who};{level};{'ja' if who == 1 else 'nein'};links" for who in (1, 2) for level in (6, 10, 14) * 20]
+    (lab / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *rows]) + "\n")
+    (told,) = thresholds_in_short(mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")).items
+    assert told == "Threshold in voltage in V, mean over people: links: nobody has one within the levels."
 
 
 def test_a_level_that_is_not_there_is_a_trial_without_a_stimulus(lab: Path) -> None:

@@ -50,6 +50,8 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
 def _group_words(one: ConditionFit, digits: int) -> str:
     if one.group is None:
         return ""
+    if one.group.without == one.group.people:
+        return "nobody has one within the levels"
     jnd = apa.number(one.group.jnd.median, digits)
     return f"{apa.number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}"
 
