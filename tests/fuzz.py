@@ -21,6 +21,7 @@ from typing import Any
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusions import Rules, apply_rules
+from analysis.logs.level_map import LevelMap
 from analysis.logs.reading import read_logs
 from analysis.paper.audit.run import PaperFile, audit
 from analysis.summary.remarks_coding import WrittenRemark, code_remarks, load_codebook
@@ -38,7 +39,7 @@ from tests.journals import forged, raw
 
 CONFIGS = shipped_folder()
 NAMES = (
-    "designs", "guns", "studies", "people's laws", "column maps", "codebooks", "papers",
+    "designs", "guns", "studies", "people's laws", "column maps", "maps of levels", "codebooks", "papers",
     "rules", "mapped logs", "own trials", "own ratings", "logs of designs", "journals", "registers", "the wire",
 )  # fmt: skip
 """Of all readers."""
@@ -380,12 +381,21 @@ def _of_configs(place: Path) -> dict[str, Reader]:
     return {
         "designs": Reader(
             read=lambda _, data: load_setup(_written(configs / "fuzzed.toml", data)),
-            beginnings=_shipped("*ion.toml", "grip.toml", "pairs.toml", "*ism.toml", "magnitude.toml"),
+            beginnings=_shipped(
+                "*ion.toml",
+                "grip.toml",
+                "pairs.toml",
+                "*ism.toml",
+                "magnitude.toml",
+                "threshold.toml",
+                "staircase.toml",
+            ),
         ),
         "guns": _config(GunConfig, *_shipped("gun*.toml")),
         "studies": _config(StudyConfig, *_shipped("study.toml")),
         "people's laws": _config(SyntheticAnswers, *_shipped("synthetic/*.toml")),
         "column maps": _config(ColumnMap, MAP, *_shipped("examples/columns.toml")),
+        "maps of levels": _config(LevelMap, *_shipped("examples/levels.toml")),
         "codebooks": Reader(read=_file("codes.toml", _coded), beginnings=(CODES,)),
         "papers": Reader(read=_file("paper.toml", _audited), beginnings=(*claims, *_shipped("paper.toml"))),
     }

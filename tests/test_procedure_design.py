@@ -86,6 +86,7 @@ REFUSED = [
     (OTHER, {"procedure": {**SHRINKING, "first_step": 5.0}}, "first_step = 5 goes through all of pulse_s"),
     (OTHER, {"procedure": {**SHRINKING, "first_step": 5.0, "step_as": "factor"}}, "first_step = 5 goes through all of"),
     (OTHER, {"factors": {"pulse_s": {"levels": {"minimum": 0.02}}}}, "minimum = 0.02 is not below maximum = 0.01"),
+    (OTHER, {"factors": {"pulse_s": {"levels": {"grain": 1e-320}}}}, "make far too many levels; they must make 2 to"),
     (ONE, {"procedure": {"threshold": {"minimum": 21.0, "maximum": 25.0}}}, "21 to 25, holds none of the levels"),
     (ONE, {"procedure": {"width": {"minimum": 0.0}}}, "width.minimum = 0 must be above 0"),
     (ONE, {"procedure": {"lapse": {"minimum": 0.0, "maximum": 0.6, "points": 3}}}, "leave nothing to feel"),

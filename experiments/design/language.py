@@ -75,9 +75,10 @@ class EvenLevels(Model):
             raise ValueError(f"minimum = {self.minimum:g} is not below maximum = {self.maximum:g}; change one of them")
         steps = (self.maximum - self.minimum) / self.grain
         if not 1 - _OFF <= steps < MAX_LEVELS - 0.5:
+            made = f"{math.floor(steps + _OFF) + 1:,}" if steps < _COUNTED else "far too many"
             raise ValueError(
-                f"minimum {self.minimum:g}, maximum {self.maximum:g} and grain {self.grain:g} make "
-                f"{math.floor(steps + _OFF) + 1:,} levels; they must make 2 to {MAX_LEVELS}"
+                f"minimum {self.minimum:g}, maximum {self.maximum:g} and grain {self.grain:g} make {made} levels; they "
+                f"must make 2 to {MAX_LEVELS}"
             )
         if abs(steps - round(steps)) > _OFF * steps:
             near = self.minimum + math.floor(steps) * self.grain
@@ -94,6 +95,8 @@ class EvenLevels(Model):
         return tuple(round(self.minimum + place * self.grain, 12) for place in range(count))
 
 
+_COUNTED = 1e6
+"""So many levels are told in figures."""
 _OFF = 1e-9
 """So much a division may be off, as a share."""
 
