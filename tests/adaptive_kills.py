@@ -8,45 +8,69 @@ import subprocess
 import time
 from pathlib import Path
 
+from experiments.config.door import read_toml
+from experiments.config.toml_text import toml_text
+from experiments.load import shipped_folder
 from experiments.record.journal import begun
 from tests.warm_start import warm
 
-_STEM = "sub-P01/sub-P01_task-staircase"
-_COLUMNS = ("trial", "track", "pulse_s", "interval", "correct")
+_COLUMNS = {
+    "staircase": ("trial", "track", "pulse_s", "interval", "correct"),
+    "pairs": ("trial", "track", "method_1", "method_2", "rather"),
+}
+"""What is compared of the designs' tables."""
 
 
-def _words(folder: Path, *more: str) -> list[object]:
-    run = ["run", "staircase", "--participant", "P01", "--screen", "synthetic", "--seed", 5]
+def _words(name: str, folder: Path, *more: str) -> list[object]:
+    run = ["run", _config(name, folder.parent), "--participant", "P01", "--screen", "synthetic", "--seed", 5]
     return [*run, "--results", folder, *more]
 
 
-def _rows(folder: Path) -> list[tuple[str, ...]]:
-    with (folder / f"{_STEM}_trials.csv").open(newline="") as file:
-        return [tuple(row[name] for name in _COLUMNS) for row in csv.DictReader(file)]
+def _config(name: str, folder: Path) -> str | Path:
+    """The shipped design; of the pairs one whose pairs are chosen by the answers."""
+    if name != "pairs":
+        return name
+    file = folder / "pairs.toml"
+    if not file.exists():
+        shipped = read_toml(shipped_folder() / "pairs.toml")
+        procedure = {"kind": "pairing", "of": ["method"], "trials": 40}
+        beside = {key: str(shipped_folder() / shipped[key]) for key in ("gun", "synthetic")}
+        kept = {key: one for key, one in shipped.items() if key != "order"}
+        file.write_text(toml_text(kept | beside | {"procedure": procedure}))
+    return file
 
 
-def unbroken(folder: Path) -> list[tuple[str, ...]]:
-    """What a run felt and answered, trial by trial, that nobody disturbed."""
-    subprocess.run(list(map(str, warm(*_words(folder)))), check=True, capture_output=True)
-    return _rows(folder)
+def _stem(name: str, folder: Path) -> Path:
+    return folder / "sub-P01" / f"sub-P01_task-{name}"
 
 
-def killed_until_done(folder: Path, draw: random.Random, kills: int) -> tuple[int, list[tuple[str, ...]]]:
+def _rows(name: str, folder: Path) -> list[tuple[str, ...]]:
+    with Path(f"{_stem(name, folder)}_trials.csv").open(newline="") as file:
+        return [tuple(row[column] for column in _COLUMNS[name]) for row in csv.DictReader(file)]
+
+
+def unbroken(name: str, folder: Path) -> list[tuple[str, ...]]:
+    """What a run of a design felt and answered, trial by trial, that nobody disturbed."""
+    subprocess.run(list(map(str, warm(*_words(name, folder)))), check=True, capture_output=True)
+    return _rows(name, folder)
+
+
+def killed_until_done(name: str, folder: Path, draw: random.Random, kills: int) -> tuple[int, list[tuple[str, ...]]]:
     """The same of a run that was killed and resumed so often, or until it was done; and how often it was."""
-    journal, done = folder / f"{_STEM}_journal.jsonl", 0
+    journal, done = Path(f"{_stem(name, folder)}_journal.jsonl"), 0
     while done < kills:
         more = ["--resume"] if _lines(journal) else ["--fresh"]
         with subprocess.Popen(
-            list(map(str, warm(*_words(folder, *more)))), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            list(map(str, warm(*_words(name, folder, *more)))), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         ) as run:
             _wait_until(run, journal, _lines(journal) + draw.randint(1, 60))
             run.kill()
         contents = begun(journal) if journal.exists() else None
         if contents is not None and contents.finished:
-            return done, _rows(folder)
+            return done, _rows(name, folder)
         done += 1
-    subprocess.run(list(map(str, warm(*_words(folder, "--resume")))), check=True, capture_output=True)
-    return done, _rows(folder)
+    subprocess.run(list(map(str, warm(*_words(name, folder, "--resume")))), check=True, capture_output=True)
+    return done, _rows(name, folder)
 
 
 def _lines(journal: Path) -> int:

@@ -13,9 +13,12 @@ from device import open_gun
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.language import Levels
 from experiments.design.plan import Plan, Trial
-from experiments.design.procedures.choosing import AdaptiveTrack, ChosenLevels, tracks_of_cell
+from experiments.design.procedures.choosing import AdaptiveTrack, ChosenLevels, paired_track, tracks_of_cell
+from experiments.design.procedures.config import PairingConfig
 from experiments.design.stimuli import stimuli_of
+from experiments.design.streams import Stream
 from experiments.live_run import LiveRun
 from experiments.record import storage
 from experiments.record.journal import Contents, Journal, contents_of, read_journal
@@ -72,20 +75,30 @@ _TRACKS = {
         "reversals": 4,
     },
 }
-KINDS = tuple(_TRACKS)
+_PAIRING = {"kind": "pairing", "of": ["method"], "trials": 14}
+KINDS = (*_TRACKS, "pairing")
 
 
 def adaptive(kind: str, sets: int = 2, **more: Any) -> Setup[DesignConfig]:
-    """The shipped threshold with short tracks of a kind, in a few sets."""
-    setup = changed("threshold")
-    tables = setup.config.model_dump(mode="json") | more
-    common = {"kind": "posterior", "of": ["voltage_V"], "mixed": ["direction"]}
-    tables |= {"procedure": common | _TRACKS[kind], "order": {"sets": sets}}
-    tables["factors"]["voltage_V"]["levels"] = {"grain": 1.0, **_EVEN}
+    """The shipped threshold with short tracks of a kind, in a few sets; or the shipped pairs with one of pairs."""
+    setup = changed("pairs" if kind == "pairing" else "threshold")
+    tables = setup.config.model_dump(mode="json") | {"order": {"sets": sets}} | more
+    if kind == "pairing":
+        tables["procedure"] = _PAIRING
+        tables["questions"]["rather"] |= {"answers": ["first", "second", "neither"], "keys": {}}
+    else:
+        tables["procedure"] = {"kind": "posterior", "of": ["voltage_V"], "mixed": ["direction"]} | _TRACKS[kind]
+        tables["factors"]["voltage_V"]["levels"] = {"grain": 1.0, **_EVEN}
     sure = {"kind": "rating", "text": "How sure?", "minimum": 0.0, "maximum": 4.0, "grain": 1.0}
     tables["questions"]["sure"] = sure  # a trial that breaks off here was answered, and is presented again
     assert setup.laws is not None
-    laws = merged(setup.laws.model_dump(), {"questions": {"sure": {"law": "ratings", "mean": {"all": 2.0}}}})
+    given = setup.laws.model_dump()
+    if kind == "pairing":
+        given["questions"]["rather"] = {
+            "law": "shares",
+            "share": {"all": {"first": 0.5, "second": 0.3, "neither": 0.2}},
+        }
+    laws = merged(given, {"questions": {"sure": {"law": "ratings", "mean": {"all": 2.0}}}})
     config = DesignConfig.model_validate(tables, strict=False)
     return replace(setup, config=config, laws=SyntheticAnswers.model_validate(laws))
 
@@ -112,15 +125,15 @@ class UndoingScreen(SyntheticScreen):
             return
         for _ in range(draw.randint(1, 5)):
             live.offer(events.Undo())
-        if isinstance(live.position.correcting, Ask):
-            live.offer(events.Correct(value=draw.choice(["forward", "backward"])))
+        if isinstance(asked := live.position.correcting, Ask):
+            live.offer(events.Correct(value=draw.choice([one.answer for one in asked.choices])))
         if live.position.state is State.CORRECTING:
             live.offer(events.Leave())
 
 
 def cut_and_resumed(setup: Setup[DesignConfig], contents: Contents, at: int, folder: Path) -> Contents:
     """The journal of a run that was cut off there, and went on without a correction."""
-    where = place(folder, "P01", "threshold")
+    where = place(folder, "P01", setup.config.design)
     storage.make_folder(where.folder)
     where.journal.write_bytes(contents.path.read_bytes()[:at])
     request = RunRequest(setup=setup, participant_id="P01", results=folder, again="resume")
@@ -129,7 +142,7 @@ def cut_and_resumed(setup: Setup[DesignConfig], contents: Contents, at: int, fol
 
 def undone_run(setup: Setup[DesignConfig], plan: Plan, folder: Path, seed: int, share: float) -> Contents:
     """The journal of a whole run of a plan, with so many corrections and repeats."""
-    clock, path = VirtualClock(), folder / f"sub-P01_task-threshold-{seed}_journal.jsonl"
+    clock, path = VirtualClock(), folder / f"sub-P01_task-{plan.experiment}-{seed}_journal.jsonl"
     told: GrowingHistory = []
     storage.make_folder(folder)
     with Journal.create(path, clock) as journal:
@@ -146,27 +159,30 @@ def undone_run(setup: Setup[DesignConfig], plan: Plan, folder: Path, seed: int, 
     return read_journal(path)
 
 
-def counted(history: History, plan: Plan, number: int) -> list[tuple[float, bool]]:
-    """The answers of a track that count, in order: to which level, and whether it was right."""
-    found: list[tuple[int, float, bool]] = []
+def counted(history: History, plan: Plan, number: int) -> list[tuple[Levels, float]]:
+    """The answers of a track that count, in order: to which levels, and whether right, or the first of a pair."""
+    found: list[tuple[int, Levels, float]] = []
     for trial in (one for one in plan.trials if one.track == number):
         answer = _that_counts(history, trial)
         if answer is not None:
-            place, level, said = answer
-            found.append((place, level, said == trial.direction))
-    return [(level, right) for _, level, right in sorted(found)]
+            place, felt, said = answer
+            found.append((place, felt, _OF_PAIR[str(said)] if said in _OF_PAIR else float(said == trial.direction)))
+    return [(felt, success) for _, felt, success in sorted(found)]
 
 
-def _that_counts(history: History, trial: Trial) -> tuple[int, float, AnswerValue] | None:
+_OF_PAIR = {"first": 1.0, "second": 0.0, "neither": 0.5}
+
+
+def _that_counts(history: History, trial: Trial) -> tuple[int, Levels, AnswerValue] | None:
     """Where the answer to a trial stands, to what it was given, and what it says: of none that was presented again."""
     last = max((at for at, (step, word) in enumerate(history) if _presents_again(step, word, trial)), default=-1)
     own = [(at, step, word) for at, (step, word) in enumerate(history) if at > last and _about(step, word) == trial]
-    said = [(at, word.value) for at, step, word in own if _asked(step, word) == "response"]
+    said = [(at, word.value) for at, step, word in own if _asked(step, word) in ("response", "rather")]
     given = [at for at, step, word in own if isinstance(step, Ask)]
     if not given:
         return None
-    (level,) = {dict(step.chosen)["voltage_V"] for _, step, _ in own if isinstance(step, FireShot)}
-    return given[0], float(level), said[-1][1]
+    (chosen,) = {step.chosen for _, step, _ in own if isinstance(step, FireShot)}
+    return given[0], tuple(level for _, level in chosen), said[-1][1]
 
 
 def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
@@ -185,13 +201,20 @@ def _presents_again(step: Step | None, word: Outcome | Remark, trial: Trial) -> 
 
 def expected(setup: Setup[DesignConfig], plan: Plan, history: History, number: int) -> ChosenLevels | None:
     """The levels that come next in a track: of one that begins anew, and is given its answers at once."""
+    track = _begun(setup, plan, number)
+    for felt, success in counted(history, plan, number):
+        track = track.after(felt, success=success)
+    return None if track.over else track.choice()
+
+
+def _begun(setup: Setup[DesignConfig], plan: Plan, number: int) -> AdaptiveTrack:
     table = setup.config.adaptive
     assert table is not None
-    levels = tuple(float(one) for one in setup.config.factors["voltage_V"].all_levels)
-    track: AdaptiveTrack = tracks_of_cell(table, [levels], 0.5)[number - 1]
-    for level, right in counted(history, plan, number):
-        track = track.after((level,), success=right)
-    return None if track.over else track.choice()
+    levels = setup.config.factors[table.of[0]].all_levels
+    if isinstance(table, PairingConfig):
+        stream = Stream(plan.seed, "pairs", plan.experiment, plan.participant_id, str(number))
+        return paired_track(table, levels, stream)
+    return tracks_of_cell(table, [tuple(map(float, levels))], 0.5)[number - 1]
 
 
 def check_levels(setup: Setup[DesignConfig], contents: Contents) -> int:
@@ -200,7 +223,7 @@ def check_levels(setup: Setup[DesignConfig], contents: Contents) -> int:
     for step, told in steps_with_history(contents):
         choice = expected(setup, plan, told, step.trial.track)
         assert choice is not None
-        assert (dict(step.chosen)["voltage_V"], step.at_edge) == (choice.levels[0], choice.at_edge)
+        assert (tuple(level for _, level in step.chosen), step.at_edge) == (choice.levels, choice.at_edge)
         checked += 1
     return checked
 

@@ -47,16 +47,21 @@ def memory() -> Iterator[Path]:
         yield Path(folder)
 
 
-def test_real_kills(tmp_path: Path, soak: Soak) -> None:
-    wanted, kills, runs, draw = unbroken(tmp_path / "unbroken"), 0, 0, random.Random(100)
+@pytest.mark.parametrize("name", ["staircase", "pairs"])
+def test_real_kills(name: str, tmp_path: Path, soak: Soak) -> None:
+    wanted, kills, runs, draw = unbroken(name, tmp_path / "unbroken"), 0, 0, random.Random(100)
     while kills < KILLS:
-        more, rows = killed_until_done(tmp_path / str(runs), draw, KILLS - kills)
+        more, rows = killed_until_done(name, tmp_path / str(runs), draw, KILLS - kills)
         assert rows == wanted
         kills, runs = kills + more, runs + 1
-    how = (
-        f"kill -9 at random records of {runs} runs of `staircase`, each resumed to its end; levels and answers compared"
+    how = f"kill -9 at random records of {runs} runs, each resumed to its end; levels and answers compared"
+    what = "active pairing" if name == "pairs" else f"`{name}`"
+    soak(
+        f"levels of {what} after a kill that are those of the unbroken run",
+        f"all, after {kills} kills",
+        "all of 100",
+        how,
     )
-    soak("levels after a kill that are those of the unbroken run", f"all, after {kills} kills", "all of 100", how)
 
 
 def test_undo_sequences(memory: Path, soak: Soak) -> None:

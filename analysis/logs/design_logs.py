@@ -158,8 +158,8 @@ def _check_plan(design: DesignConfig, plan: Plan, rows: Sequence[Mapping[str, ob
 
 def _chosen(design: DesignConfig, planned: Trial, row: Mapping[str, object]) -> Condition:
     """The levels that a procedure chose for a trial, as its row has them."""
-    felt = ((name, row[name]) for name in design.adapted) if planned.track else ()
-    return tuple((name, level) for name, level in felt if isinstance(level, float))
+    felt = ((name, row[name]) for name in design.chosen_names) if planned.track else ()
+    return tuple((name, level) for name, level in felt if isinstance(level, str | float))
 
 
 def _check_times(design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> None:

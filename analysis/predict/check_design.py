@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 from typing import Any
 
 from analysis.predict.drawn import RatingStudies, studies_of
@@ -19,7 +20,7 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import shown_level
 from experiments.design.methods_section import methods_section
-from experiments.design.plan import Plan
+from experiments.design.plan import Condition, Plan
 from experiments.design.planned import (
     PlannedRun,
     levels_text,
@@ -30,6 +31,7 @@ from experiments.design.planned import (
     warnings,
 )
 from experiments.design.planning import groups, plan_of, square_size
+from experiments.design.procedures.config import PairingConfig
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
 from experiments.screens.synthetic import synthetic_participant_of
@@ -186,13 +188,26 @@ def _shots(setup: Setup[DesignConfig], plan: Plan) -> list[tuple[Method, int]]:
     design = setup.config
     each = design.trial.max_shots if design.trial.kind == "train" else 1
     felt = Counter[Method]()
-    highest = tuple((name, design.factors[name].all_levels[-1]) for name in design.adapted)
+    strongest = cache(partial(_strongest, setup))
     for planned in plan.trials:
-        trial = planned.with_chosen(highest) if planned.track else planned
+        trial = planned.with_chosen(strongest(planned.levels)) if planned.track else planned
         for place in range(max(1, len(trial.intervals))):
             if (levels := trial.levels_at(place)) is not None:
                 felt[stimulus(design, setup.gun, levels).parameters] += each
     return [*felt.items()]
+
+
+def _strongest(setup: Setup[DesignConfig], levels: Condition) -> Condition:
+    """What a procedure could choose beside some levels that shakes most: the highest numbers; of items two."""
+    design = setup.config
+    if not isinstance(design.procedure, PairingConfig):
+        return design.last_choice
+    (name,) = design.adapted
+    shaken = {
+        level: exposure([(stimulus(design, setup.gun, (*levels, (name, level))).parameters, 1)]).a8_m_s2
+        for level in design.factors[name].all_levels
+    }
+    return tuple(zip(design.chosen_names, sorted(shaken, key=shaken.__getitem__, reverse=True), strict=False))
 
 
 def _warnings(

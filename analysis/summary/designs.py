@@ -174,9 +174,18 @@ def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[C
 def _preferred(
     design: DesignConfig, name: str, question: QuestionConfig, scored: pd.DataFrame
 ) -> tuple[ConditionSummary, ...] | None:
-    """How often each level of a pair was chosen: in the mean over people, of all their trials that had it."""
+    """How often each level of a pair was chosen: in the mean over people, of all their trials that had it.
+
+    `None`, too, where a procedure chose the pairs: a level that met its equals alone is chosen half the time.
+    """
     compared = design.trial.compare
-    if design.trial.kind != "pair" or compared is None or question.kind != "choice" or question.correct is not None:
+    if (
+        design.trial.kind != "pair"
+        or design.adapted
+        or compared is None
+        or question.kind != "choice"
+        or question.correct is not None
+    ):
         return None
     tied = ~scored[name].isin(question.answers[:2])
     chosen = scored["score"].where(~tied, 0.5)  # of neither

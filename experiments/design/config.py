@@ -33,8 +33,9 @@ from experiments.design.language import (
     TrialConfig,
     shown_level,
 )
+from experiments.design.plan import Condition, in_interval
 from experiments.design.procedure_problems import procedure_problems
-from experiments.design.procedures.config import AdaptiveConfig, ConstantConfig, ProcedureConfig
+from experiments.design.procedures.config import AdaptiveConfig, ConstantConfig, PairingConfig, ProcedureConfig
 
 
 class DesignConfig(Model):
@@ -115,6 +116,20 @@ class DesignConfig(Model):
     def adapted(self) -> tuple[str, ...]:
         """The factors whose levels are chosen from the answers so far."""
         return self.adaptive.of if self.adaptive else ()
+
+    @property
+    def chosen_names(self) -> tuple[str, ...]:
+        """By what names the levels are known that are chosen for a trial: of a pair one an interval."""
+        if isinstance(self.procedure, PairingConfig):
+            return tuple(in_interval(name, place) for name in self.adapted for place in (1, 2))
+        return self.adapted
+
+    @property
+    def last_choice(self) -> Condition:
+        """What could be chosen for a trial: the last level of each factor, the highest of numbers; of a pair two."""
+        last = [self.factors[name].all_levels[::-1] for name in self.adapted]
+        pair = isinstance(self.procedure, PairingConfig)
+        return tuple(zip(self.chosen_names, last[0] if pair else [one[0] for one in last], strict=False))
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -201,7 +216,7 @@ def _columns_of_factors(design: DesignConfig) -> Iterator[str]:
     for name in design.factors:
         yield name
         if name == design.trial.compare:
-            yield from (f"{name}_{place}" for place in range(1, design.trial.intervals + 1))
+            yield from (in_interval(name, place) for place in range(1, design.trial.intervals + 1))
 
 
 def _columns_of_questions(design: DesignConfig) -> Iterator[str]:

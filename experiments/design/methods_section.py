@@ -15,8 +15,8 @@ from experiments.design.language import (
     shown_level,
 )
 from experiments.design.planned import PlannedRun
-from experiments.design.procedures.config import AdaptiveConfig, least_of_track
-from experiments.design.procedures.in_words import end_words, rule_words
+from experiments.design.procedures.config import AdaptiveConfig, PairingConfig, least_of_track
+from experiments.design.procedures.in_words import end_words, pairing_words, rule_words
 from experiments.design.stimuli import by_hand
 
 
@@ -53,6 +53,10 @@ def _factors(design: DesignConfig) -> Iterator[str]:
 
 
 def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
+    if isinstance(table, PairingConfig):
+        items = _sentence([(name, design.factors[name]) for name in table.of])
+        yield f"{items} was compared in pairs. The pair was chosen after each answer, {pairing_words(table)}."
+        return
     levels = [tuple(float(level) for level in design.factors[name].all_levels) for name in table.of]
     ranges = [
         f"{factor_words(name)} ({len(some)} levels, {some[0]:g} to {some[-1]:g})"
@@ -197,7 +201,10 @@ def _several_intervals(design: DesignConfig, planned: PlannedRun) -> str:
     trial, compared = design.trial, factor_words(design.trial.compare or "")
     gap = "with a hand-over between" if planned.hands_within else f"{trial.gap_s:g} s apart"
     if trial.kind == "pair":
-        return f"two shots {gap} that differed in {compared}: all pairs, in both orders as often as it goes"
+        pairs = "all pairs, in both orders as often as it goes"
+        if design.adapted:
+            pairs = "each pair first in an order drawn at random, and turned round whenever it came again"
+        return f"two shots {gap} that differed in {compared}: {pairs}"
     standard = shown_level(trial.standard) if trial.standard is not None else ""
     named = f"the standard ({compared}: {standard})"
     if trial.kind == "abx":

@@ -53,7 +53,18 @@ def condition(**levels: Level) -> Condition:
 
 
 CHOSEN = "chosen"
-"""In an interval: the level that a procedure chooses when its trial comes. Adapted levels are numbers."""
+"""In an interval: the level that a procedure chooses when its trial comes. No level that it may choose is called so."""
+
+
+def in_interval(factor: str, place: int) -> str:
+    """The name of a factor's level in an interval, counted from 1: that of its column.
+
+    >>> in_interval("voltage_V", 2)
+    'voltage_V_2'
+    """
+    return f"{factor}_{place}"
+
+
 _BLANKS: dict[str, object] = {
     "practice": False,
     "instruction": "",
@@ -103,11 +114,17 @@ class Trial:
     track: int = 0
 
     def with_chosen(self, chosen: Condition) -> Trial:
-        """The trial with the levels that a procedure chose for it, where it has none yet: what was felt."""
-        own = dict(chosen).get(self.compare)
-        held = tuple(own if level == CHOSEN and own is not None else level for level in self.intervals)
-        new = tuple(pair for pair in chosen if self.level(pair[0]) is None)
-        return replace(self, levels=(*self.levels, *new), intervals=held) if new else self
+        """The trial with the levels that a procedure chose for it, where it has none yet: what was felt.
+
+        Those of a pair are named as the factor that is compared `in_interval`.
+        """
+        named, known = {in_interval(self.compare, at): at for at, _ in enumerate(self.intervals, start=1)}, dict(chosen)
+        held = tuple(
+            known.get(name, known.get(self.compare, level)) if level == CHOSEN else level
+            for name, level in zip(named, self.intervals, strict=True)
+        )
+        new = tuple(pair for pair in chosen if pair[0] not in named and self.level(pair[0]) is None)
+        return replace(self, levels=(*self.levels, *new), intervals=held)
 
     def level(self, name: str) -> Level | None:
         """The level of a factor; `None` if the trial has none."""

@@ -11,7 +11,7 @@ from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.language import DIRECTION_FACTOR, shown_level
-from experiments.design.plan import Condition, Plan, Trial
+from experiments.design.plan import CHOSEN, Condition, Plan, Trial
 from experiments.design.planning import groups, plan_of
 from experiments.design.procedures.config import least_of_track
 from experiments.design.stimuli import by_hand, settings
@@ -51,7 +51,7 @@ def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) 
 
 def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
     """What a plan comes to, whether or not the design allows it."""
-    trials = plan.trials
+    trials = [trial.with_chosen(design.last_choice) if trial.track else trial for trial in plan.trials]
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
     shortest = _shortest(design, trials)
     return PlannedRun(
@@ -185,7 +185,7 @@ def trial_text(design: DesignConfig, trial: Trial) -> str:
         return "catch"
     varied = [name for name in design.varying if len(design.factors[name].all_levels) > 1 and name != trial.compare]
     track = f"track {trial.track}" if trial.track else ""
-    held = " – ".join(map(shown_level, trial.intervals))
+    held = "pair" if set(trial.intervals) == {CHOSEN} else " – ".join(map(shown_level, trial.intervals))
     return " ".join(filter(None, (track, levels_text(trial, varied), held))) or "shot"
 
 

@@ -10,15 +10,19 @@ import numpy as np
 
 from experiments.design.language import (
     DRIVEN,
+    METHOD_FACTOR,
     FactorConfig,
     OrderConfig,
     QuestionConfig,
     TrialConfig,
     shown_level,
 )
+from experiments.design.plan import CHOSEN
 from experiments.design.procedures.config import (
     AdaptiveConfig,
     KestenConfig,
+    NumericConfig,
+    PairingConfig,
     PosteriorConfig,
     UpDownConfig,
     starts_of,
@@ -34,12 +38,20 @@ _LEAST_AMONG = 0.001
 """Of a prior so much at least lies among the levels."""
 _MUCH, _ROUNDED = 100, 1e-9
 """Widths so many times smaller than the distance of levels, or larger than their range, no answer tells apart."""
+_FEWEST_ITEMS, _MOST_ITEMS = 3, 30
+"""Two items are one pair; the next pair of more items takes longer than a hand-over, by the fourth power (measured)."""
 
 
-def success_of(questions: Mapping[str, QuestionConfig], named: str | None) -> str | None:
-    """The question whose answers a procedure follows: the one that is named, else the first that can succeed."""
-    able = [name for name, one in questions.items() if one.when == "trial" and has_success(one)]
-    return next((name for name in able if named in (None, name)), None)
+def followed_question(table: AdaptiveConfig, questions: Mapping[str, QuestionConfig]) -> str | None:
+    """The question whose answers a procedure follows: the one that is named, else the first that it can follow."""
+    follows = chooses_of_pair if isinstance(table, PairingConfig) else has_success
+    able = [name for name, one in questions.items() if one.when == "trial" and follows(one)]
+    return next((name for name in able if table.question in (None, name)), None)
+
+
+def chooses_of_pair(question: QuestionConfig) -> bool:
+    """Whether an answer says which of a pair was chosen: the first answer the first, the second the other."""
+    return question.kind == "choice" and len(question.answers) in (2, 3) and question.correct in (None, "larger")
 
 
 def has_success(question: QuestionConfig) -> bool:
@@ -61,9 +73,14 @@ def procedure_problems(
     questions: Mapping[str, QuestionConfig],
 ) -> Iterator[str]:
     """Each disagreement, with key, value and what would do."""
-    own = [*_factor_problems(table, factors, order), *_order_problems(table, order, trial)]
+    own = [
+        *_kind_problems(table, trial),
+        *_factor_problems(table, factors, order),
+        *_order_problems(order),
+        *_comparison_problems(table, trial),
+    ]
     yield from own
-    name = success_of(questions, table.question)
+    name = followed_question(table, questions)
     if name is None:
         yield from _question_problems(table, questions)
     later = [one for one, question in questions.items() if question.when == "block"]
@@ -71,8 +88,14 @@ def procedure_problems(
         yield f"questions.{later[0]}: when = 'block': a track has no fixed number of trials to ask about; ask at once"
     if own or name is None:
         return
+    if isinstance(table, PairingConfig):
+        yield from _pairing_problems(table, factors[table.of[0]])
+    else:
+        yield from _numeric_problems(table, factors, guess_of(questions[name]))
+
+
+def _numeric_problems(table: NumericConfig, factors: Mapping[str, FactorConfig], guess: float) -> Iterator[str]:
     levels = [tuple(float(one) for one in factors[one].all_levels) for one in table.of]
-    guess = guess_of(questions[name])
     yield from _start_problems(table, levels[0])
     match table:
         case PosteriorConfig():
@@ -87,7 +110,8 @@ def _factor_problems(table: AdaptiveConfig, factors: Mapping[str, FactorConfig],
         yield f"procedure names {unknown[0]!r}, which is no factor; the factors are {', '.join(factors)}"
         return
     for name in table.of:
-        yield from _chosen_problems(name, factors[name])
+        what = _item_problems if isinstance(table, PairingConfig) else _chosen_problems
+        yield from what(name, factors[name])
     for name in (*table.of, *table.mixed):
         factor = factors[name]
         if factor.within is not None or factor.between or name in (*order.session, *order.set):
@@ -111,7 +135,32 @@ def _chosen_problems(name: str, factor: FactorConfig) -> Iterator[str]:
         yield f"factors.{name}.levels: a procedure needs them in order, lowest first"
 
 
-def _order_problems(table: AdaptiveConfig, order: OrderConfig, trial: TrialConfig) -> Iterator[str]:
+def _item_problems(name: str, factor: FactorConfig) -> Iterator[str]:
+    items = len(factor.all_levels)
+    if name not in (METHOD_FACTOR, *DRIVEN):
+        yield (
+            f"procedure.of: {name} is set by hand, before the answers are known; pairs are chosen of what the command "
+            f"of a shot carries: {', '.join((METHOD_FACTOR, *DRIVEN))}"
+        )
+    elif not _FEWEST_ITEMS <= items <= _MOST_ITEMS:
+        yield (
+            f"factors.{name}.levels: {items} items; pairs are chosen of {_FEWEST_ITEMS} to {_MOST_ITEMS}: of fewer "
+            "leave [procedure] out, of more take some away"
+        )
+    elif CHOSEN in factor.all_levels:
+        yield f"factors.{name}.levels: {CHOSEN!r} stands for what is not chosen yet; give that level another name"
+
+
+def _pairing_problems(table: PairingConfig, factor: FactorConfig) -> Iterator[str]:
+    items = len(factor.all_levels)
+    if table.trials < items - 1:
+        yield (
+            f"procedure.trials = {table.trials} cannot connect the {items} levels of {table.of[0]}, which takes "
+            f"{items - 1} at least; allow more trials, or compare fewer levels"
+        )
+
+
+def _order_problems(order: OrderConfig) -> Iterator[str]:
     said = {
         "repetitions": order.repetitions != 1,
         "trials": order.trials != "random",
@@ -120,8 +169,22 @@ def _order_problems(table: AdaptiveConfig, order: OrderConfig, trial: TrialConfi
     }
     for key in (key for key, wrong in said.items() if wrong):
         yield f"order.{key} is of constant stimuli; procedure.trials and procedure.interleave say it here: remove it"
-    if trial.kind == "pair":
-        yield "trial.kind = 'pair': all levels are compared with each other; a procedure needs a standard"
+
+
+def _kind_problems(table: AdaptiveConfig, trial: TrialConfig) -> Iterator[str]:
+    pairs = isinstance(table, PairingConfig)
+    if pairs and trial.kind != "pair":
+        yield f"trial.kind = {trial.kind!r}: the procedure chooses pairs; say kind = 'pair', or take another procedure"
+    if pairs and len(table.of) > 1:
+        yield f"procedure.of = {', '.join(table.of)}: a pair differs in one factor; name the one of trial.compare"
+    if not pairs and trial.kind == "pair":
+        yield (
+            "trial.kind = 'pair': all levels are compared with each other; a procedure needs a standard, or is of the "
+            "kind pairing"
+        )
+
+
+def _comparison_problems(table: AdaptiveConfig, trial: TrialConfig) -> Iterator[str]:
     if trial.compare in table.mixed:
         yield f"procedure.mixed: {trial.compare} is what intervals differ in; take it out"
     if trial.intervals > 1 and trial.compare not in table.of:
@@ -130,15 +193,22 @@ def _order_problems(table: AdaptiveConfig, order: OrderConfig, trial: TrialConfi
 
 def _question_problems(table: AdaptiveConfig, questions: Mapping[str, QuestionConfig]) -> Iterator[str]:
     rule = "a procedure follows a yes-no, or a choice of which one is right (`correct`), asked after each trial"
+    lacks = "no answer is a success"
+    if isinstance(table, PairingConfig):
+        rule = (
+            "it follows a choice asked after each trial whose first answer is the first of the pair, the second the "
+            "other, a third neither"
+        )
+        lacks = "no answer says which of the pair it is"
     if table.question is None:
-        yield f"procedure: no answer is a success ({', '.join(questions)}): {rule}"
+        yield f"procedure: {lacks} ({', '.join(questions)}): {rule}"
     elif table.question in questions:
-        yield f"procedure.question = {table.question!r}: no answer to it is a success: {rule}"
+        yield f"procedure.question = {table.question!r}: {lacks}: {rule}"
     else:
         yield f"procedure.question = {table.question!r} is no question; they are {', '.join(questions)}"
 
 
-def _start_problems(table: AdaptiveConfig, levels: NumericLevels) -> Iterator[str]:
+def _start_problems(table: NumericConfig, levels: NumericLevels) -> Iterator[str]:
     for start in starts_of(table):
         if start is not None and start not in levels:
             near = sorted(levels, key=lambda level: abs(level - start))[:2]

@@ -91,13 +91,13 @@ def intervals(design: DesignConfig, gun: GunConfig, trial: Trial) -> tuple[Inter
 class Stimuli:
     """All that a run can fire: what the gun is opened with, and the shot of some levels.
 
-    A rendering that a hand changes the gun for has a name of its own, which a line to a gun can carry. `highest` are
-    the highest levels of what a procedure chooses.
+    A rendering that a hand changes the gun for has a name of its own, which a line to a gun can carry. `last_choice`
+    are levels that a procedure could choose, the highest of numbers.
     """
 
     methods: Mapping[str, Method]
     of_levels: Callable[[Condition], Shot]
-    highest: Condition = ()
+    last_choice: Condition = ()
 
     def shot(self, trial: Trial, interval: int) -> Shot | None:
         """The shot of an interval, counted from 0; `None` where nothing is felt."""
@@ -111,8 +111,8 @@ class Stimuli:
                 self.shot(trial, place)
 
     def first_shot(self, trials: Iterable[Trial]) -> Shot:
-        """The first shot that is felt in some trials; a track's is at the highest levels, before any is chosen."""
-        filled = (trial.with_chosen(self.highest) if trial.track else trial for trial in trials)
+        """The first shot that is felt in some trials; a track's is at the last levels, before any is chosen."""
+        filled = (trial.with_chosen(self.last_choice) if trial.track else trial for trial in trials)
         shots = (self.shot(trial, place) for trial in filled for place in range(max(1, len(trial.intervals))))
         return next(shot for shot in shots if shot is not None)
 
@@ -132,7 +132,7 @@ def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
     return Stimuli(
         methods={name: method for method, name in names.items()},
         of_levels=of_levels,
-        highest=tuple((name, design.factors[name].all_levels[-1]) for name in design.adapted),
+        last_choice=design.last_choice,
     )
 
 
@@ -231,9 +231,31 @@ def unchanged_methods(design: DesignConfig) -> tuple[str, ...]:
 def limits(design: DesignConfig, gun: GunConfig) -> list[ConditionLimits]:
     """What every cell asks of the gun. `ConfigError`: one is beyond a limit, never comes home, or never moves.
 
-    A cell whose magnet never moves is let through by a design that says `below_break_away = true`.
+    A cell whose magnet never moves is let through by a design that says `below_break_away = true`. `ConfigError`, too,
+    where a hand would have to set what a procedure chooses.
     """
-    return [_limits_of(design, gun, levels) for levels in dict.fromkeys(_shot_cells(design))]
+    found = [_limits_of(design, gun, levels) for levels in dict.fromkeys(_shot_cells(design))]
+    _check_hands(design, gun)
+    return found
+
+
+def _check_hands(design: DesignConfig, gun: GunConfig) -> None:
+    """What is chosen after an answer comes too late for a hand that sets the gun before."""
+    by_others: dict[Condition, dict[tuple[tuple[str, str], ...], str]] = {}
+    for levels in _shot_cells(design) if design.adapted else ():
+        others = tuple(pair for pair in levels if pair[0] not in design.adapted)
+        by_others.setdefault(others, {}).setdefault(settings(design, gun, levels), shown_cell(levels))
+    for found in (found for found in by_others.values() if len(found) > 1):
+        (one, cell), (other, other_cell) = [*found.items()][:2]
+        name, *_ = design.adapted
+        raise ConfigError(
+            f"factors.{name}.levels: a procedure chooses them after an answer, when hands have set the gun, and "
+            f"{cell} has {_hand_words(one)}, {other_cell} {_hand_words(other)}; take levels that are set alike"
+        )
+
+
+def _hand_words(held: tuple[tuple[str, str], ...]) -> str:
+    return ", ".join(f"{name} {level}" for name, level in held) or "nothing to set"
 
 
 def _shot_cells(design: DesignConfig) -> Iterator[Condition]:

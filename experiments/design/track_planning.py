@@ -50,7 +50,9 @@ def _track(
     """The trials of a track, with every form that they can have as equally often as it goes."""
     trial, stream = design.trial, streams.of("track", str(number))
     held: list[tuple[tuple[str | float, ...], int | None]] = [((), None)]
-    if trial.intervals > 1 and trial.standard is not None:
+    if trial.kind == "pair":
+        held = [((CHOSEN, CHOSEN), None)]
+    elif trial.standard is not None:
         held = [*arrangements(trial.kind, CHOSEN, trial.standard)]
     forms = [
         Content(in_order(design, (*cell, *mixed)), intervals, odd, track=number)

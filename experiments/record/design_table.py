@@ -16,7 +16,7 @@ from experiments.design.language import (
     QuestionConfig,
     shown_level,
 )
-from experiments.design.plan import CHOSEN, Plan, Trial
+from experiments.design.plan import CHOSEN, Plan, Trial, in_interval
 from experiments.record import tables
 from experiments.record.tables import Column, Row, presentation
 from experiments.session.history import History, TrialHistory, by_trial
@@ -59,13 +59,14 @@ def _places(design: DesignConfig) -> Iterator[Column]:
 def _factors(design: DesignConfig, names: Iterable[str]) -> Iterator[Column]:
     for name in names:
         factor, compared = design.factors[name], name == design.trial.compare
+        chosen = _CHOSEN if name in design.adapted else ""
         if not (compared and design.trial.kind == "pair"):
             what = "level that was compared" if compared else _MEANINGS.get(name, "level of this factor")
-            what += _CHOSEN if name in design.adapted else ""
-            yield _factor(name, factor, what)
+            yield _factor(name, factor, what + chosen)
         if compared:
             for place in range(1, design.trial.intervals + 1):
-                yield _factor(f"{name}_{place}", factor, f"level in interval {place}; empty if there was no stimulus")
+                own = chosen if in_interval(name, place) in design.chosen_names else "; empty if there was no stimulus"
+                yield _factor(in_interval(name, place), factor, f"level in interval {place}{own}")
 
 
 _CHOSEN = ", chosen by the answers before; empty if it was not felt"
@@ -179,7 +180,7 @@ def went_back(rows: Iterable[Row]) -> Iterator[Row]:
 
 def _compared(trial: Trial) -> Row:
     """The level of each interval, and the one that was compared."""
-    held = {f"{trial.compare}_{place}": level for place, level in enumerate(trial.intervals, start=1)}
+    held = {in_interval(trial.compare, place): level for place, level in enumerate(trial.intervals, start=1)}
     felt: Row = {name: None if level in (EMPTY, CHOSEN) else level for name, level in held.items()}
     return felt
 

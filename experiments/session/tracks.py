@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
-from experiments.design.procedure_problems import guess_of, success_of
-from experiments.design.procedures.choosing import AdaptiveTrack, ChosenLevels, tracks_of_cell
-from experiments.design.procedures.config import AdaptiveConfig
+from experiments.design.procedure_problems import followed_question, guess_of
+from experiments.design.procedures.choosing import AdaptiveTrack, ChosenLevels, paired_track, tracks_of_cell
+from experiments.design.procedures.config import AdaptiveConfig, NumericConfig, PairingConfig
+from experiments.design.streams import Stream
 from experiments.session import steps
 from experiments.session.history import History
 from experiments.session.remarks import EntryCorrected, Remark
-from experiments.tasks.questions import AnswerValue, is_success
+from experiments.tasks.questions import AnswerValue, is_success, share_of_first
 
 _OF_A_PRESENTATION = steps.FireShot | steps.Present | steps.Asking
 """Steps whose trial is presented again where they are broken off."""
@@ -36,7 +37,7 @@ class Tracks:
 
     def __init__(self, design: DesignConfig, table: AdaptiveConfig, plan: Plan, told: History) -> None:
         self._design, self._table, self._told, self._read = design, table, told, 0
-        self._question = success_of(design.questions, table.question) or ""
+        self._question = followed_question(table, design.questions) or ""
         self._begun = _begun(design, table, plan)
         self._now = dict(self._begun)
         self._felt: dict[Trial, Condition] = {}
@@ -68,7 +69,7 @@ class Tracks:
 
     def condition(self, choice: ChosenLevels) -> Condition:
         """Chosen levels by their factors."""
-        return tuple(zip(self._table.of, choice.levels, strict=True))
+        return tuple(zip(self._design.chosen_names, choice.levels, strict=True))
 
     def _track(self, number: int) -> AdaptiveTrack:
         self._catch_up()
@@ -118,15 +119,34 @@ class Tracks:
         self._now[number] = track
 
     def _after(self, track: AdaptiveTrack, trial: Trial, answer: CountedAnswer) -> AdaptiveTrack:
+        felt = tuple(level for _, level in answer.felt)
+        return track.after(felt, success=self._success(trial, answer))
+
+    def _success(self, trial: Trial, answer: CountedAnswer) -> float:
+        """1 of an answer that succeeds, 0 of another; of a pair how much the first was chosen."""
         question = self._design.questions[self._question]
-        success = is_success(self._design, question, trial.with_chosen(answer.felt), answer.value)
-        felt = tuple(float(level) for _, level in answer.felt)
-        return track.after(felt, success=success)
+        if isinstance(self._table, PairingConfig):
+            return share_of_first(question, answer.value)
+        return float(is_success(self._design, question, trial.with_chosen(answer.felt), answer.value))
 
 
 def _begun(design: DesignConfig, table: AdaptiveConfig, plan: Plan) -> dict[int, AdaptiveTrack]:
-    """Each track before its first answer: those of a cell in the order of their starts."""
-    question = design.questions[success_of(design.questions, table.question) or ""]
+    """Each track before its first answer."""
+    if isinstance(table, PairingConfig):
+        return _paired(design, table, plan)
+    return _numeric(design, table, plan)
+
+
+def _paired(design: DesignConfig, table: PairingConfig, plan: Plan) -> dict[int, AdaptiveTrack]:
+    """Each with a random stream of its own, by which pairs that are alike are ordered."""
+    (name,), purpose = table.of, ("pairs", plan.experiment, plan.participant_id)
+    items, numbers = design.factors[name].all_levels, {trial.track for trial in plan.trials if trial.track}
+    return {number: paired_track(table, items, Stream(plan.seed, *purpose, str(number))) for number in numbers}
+
+
+def _numeric(design: DesignConfig, table: NumericConfig, plan: Plan) -> dict[int, AdaptiveTrack]:
+    """Those of a cell in the order of their starts."""
+    question = design.questions[followed_question(table, design.questions) or ""]
     levels = [tuple(float(level) for level in design.factors[name].all_levels) for name in table.of]
     made = tracks_of_cell(table, levels, guess_of(question))
     cells: dict[Condition, list[int]] = {}

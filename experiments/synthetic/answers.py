@@ -172,8 +172,8 @@ class SyntheticParticipant:
 
     def _decisions(self, name: str, law: DiffusionLaw) -> dict[Condition, Diffusion]:
         """This person's decision in each cell; where levels are chosen, at the highest, and at others when felt."""
-        highest = tuple((one, self._design.factors[one].all_levels[-1]) for one in self._design.adapted)
-        cells = {(own := trial.with_chosen(highest)).levels: own for trial in self._plan.trials if not trial.catch}
+        last = self._design.last_choice
+        cells = {(own := trial.with_chosen(last)).levels: own for trial in self._plan.trials if not trial.catch}
         try:
             return {levels: self._made(law, trial) for levels, trial in cells.items()}
         except ValueError as error:

@@ -156,6 +156,17 @@ def is_success(design: DesignConfig, question: QuestionConfig, trial: Trial, ans
     return bool(is_right(design, question, trial, answer))
 
 
+def share_of_first(question: QuestionConfig, answer: AnswerValue) -> float:
+    """How much the first of a pair was chosen: 1 by the first answer, 0 by the second, 0.5 by another, a tie.
+
+    >>> q = QuestionConfig(kind="choice", text="?", answers=("this", "that", "neither"))
+    >>> [share_of_first(q, answer) for answer in q.answers]
+    [1.0, 0.0, 0.5]
+    """
+    first, second, *_ = question.named_answers
+    return {first: 1.0, second: 0.0}.get(str(answer), 0.5)
+
+
 def correct_columns(questions: Mapping[str, QuestionConfig]) -> dict[str, str]:
     """The column of each scored question that says whether its answer was right: `correct` for the first.
 

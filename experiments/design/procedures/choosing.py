@@ -13,11 +13,14 @@ from typing import Protocol, Self
 
 import numpy as np
 
+from experiments.design.language import Levels
 from experiments.design.procedures.config import (
-    AdaptiveConfig,
+    NumericConfig,
+    PairingConfig,
     PosteriorConfig,
     PriorConfig,
 )
+from experiments.design.procedures.pairing import PairingRule, pair_after, pairing_rule
 from experiments.design.procedures.posterior import (
     EntropyRule,
     ParameterGrid,
@@ -34,6 +37,7 @@ from experiments.design.procedures.psychometric import Shares
 from experiments.design.procedures.surface import SurfaceGrid, surface_grid
 from experiments.design.procedures.up_down import Kesten, TrackState, UpDown, track_after
 from experiments.design.procedures.walks import NumericLevels, walk_rule
+from experiments.design.streams import Stream
 
 _WANTED: Mapping[str, tuple[WantedParameter, ...]] = {
     "threshold": ("threshold",),
@@ -44,9 +48,12 @@ _WANTED: Mapping[str, tuple[WantedParameter, ...]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChosenLevels:
-    """The levels of a track's next trial. `at_edge`: at the end of what there is, where the rule may want to go on."""
+    """The levels of a track's next trial: one a factor, or of a pair the first and the second.
 
-    levels: NumericLevels
+    `at_edge`: at the end of what there is, where the rule may want to go on.
+    """
+
+    levels: Levels
     at_edge: bool = False
 
 
@@ -60,8 +67,11 @@ class AdaptiveTrack(Protocol):
     def choice(self) -> ChosenLevels:
         """The levels of its next trial."""
 
-    def after(self, felt: NumericLevels, *, success: bool) -> Self:
-        """Where it stands after one more answer, to what was felt."""
+    def after(self, felt: Levels, *, success: float) -> Self:
+        """Where it stands after one more answer, to what was felt: 1 for a success, 0 for none.
+
+        Of a pair 1 for the first, 0 for the second, 0.5 for neither.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +98,9 @@ class WalkedTrack:
             raise ValueError("the track is over")
         return ChosenLevels(levels=(state.next_level,), at_edge=state.at_edge)
 
-    def after(self, felt: NumericLevels, *, success: bool) -> Self:  # noqa: ARG002 - a walk follows its answers
+    def after(self, felt: Levels, *, success: float) -> Self:  # noqa: ARG002 - a walk follows its answers
         """One answer more."""
-        return replace(self, answers=(*self.answers, success))
+        return replace(self, answers=(*self.answers, success == 1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,7 +111,7 @@ class PosteriorRule:
     grid: ParameterGrid | SurfaceGrid
     rule: VarianceRule | EntropyRule
     stimuli: tuple[NumericLevels, ...]
-    places: Mapping[NumericLevels, int]
+    places: Mapping[Levels, int]
     edges: frozenset[int]
 
     def credible_width(self, posterior: Shares) -> float:
@@ -137,13 +147,43 @@ class KnownTrack:
         place = int(best_stimulus(rule.rule.gains(self.posterior)))
         return ChosenLevels(levels=rule.stimuli[place], at_edge=place in rule.edges)
 
-    def after(self, felt: NumericLevels, *, success: bool) -> Self:
+    def after(self, felt: Levels, *, success: float) -> Self:
         """One answer more, to what was felt."""
-        known = posterior_after(self.rule.grid, self.posterior, self.rule.places[felt], success)
+        known = posterior_after(self.rule.grid, self.posterior, self.rule.places[felt], success == 1)
         return replace(self, posterior=known, count=self.count + 1)
 
 
-def tracks_of_cell(table: AdaptiveConfig, levels: Sequence[NumericLevels], guess: float) -> tuple[AdaptiveTrack, ...]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairedTrack:
+    """A track of so many pairs of items, each pair chosen by what was said of those before."""
+
+    rule: PairingRule
+    items: Levels
+    trials: int
+    choices: tuple[tuple[int, int, float], ...] = ()
+
+    @property
+    def over(self) -> bool:
+        """Whether its trials are done."""
+        return len(self.choices) >= self.trials
+
+    def choice(self) -> ChosenLevels:
+        """The pair after which the order of the items is expected to be known best."""
+        one, other = pair_after(self.rule, self.choices)
+        return ChosenLevels(levels=(self.items[one], self.items[other]))
+
+    def after(self, felt: Levels, *, success: float) -> Self:
+        """One answer more, to the pair that was felt."""
+        one, other = map(self.items.index, felt)
+        return replace(self, choices=(*self.choices, (one, other, success)))
+
+
+def paired_track(table: PairingConfig, items: Levels, stream: Stream) -> PairedTrack:
+    """A track of pairs before its first answer; the stream is its own."""
+    return PairedTrack(rule=pairing_rule(len(items), stream, table.spread), items=items, trials=table.trials)
+
+
+def tracks_of_cell(table: NumericConfig, levels: Sequence[NumericLevels], guess: float) -> tuple[AdaptiveTrack, ...]:
     """The tracks of a cell before their first answer.
 
     `levels` are those of each adapted factor, and `guess` how often who feels nothing is right.

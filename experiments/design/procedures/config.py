@@ -36,10 +36,15 @@ class TracksConfig(Model):
     of: Annotated[tuple[ColumnName, ...], Field(min_length=1, max_length=2), AfterValidator(once)]
     question: ColumnName | None = None
     trials: Annotated[int, Field(ge=1, le=MAX_TRACK)]
-    least_trials: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
     mixed: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
     interleave: bool = True
     show_level: bool = False
+
+
+class NumericTracksConfig(TracksConfig):
+    """What every procedure says that chooses numbers: it may end a track before its last trial."""
+
+    least_trials: Annotated[int, Field(ge=0, le=MAX_TRACK)] = 0
 
     @model_validator(mode="after")
     def _least_within_most(self) -> Self:
@@ -48,7 +53,7 @@ class TracksConfig(Model):
         return self
 
 
-class UpDownConfig(TracksConfig):
+class UpDownConfig(NumericTracksConfig):
     """Up-down: so many wrong answers in a row make it easier, so many right ones harder."""
 
     kind: Literal["up-down"]
@@ -77,7 +82,7 @@ class UpDownConfig(TracksConfig):
         return -(-moves // 2) * one + moves // 2 * other
 
 
-class KestenConfig(TracksConfig):
+class KestenConfig(NumericTracksConfig):
     """Accelerated stochastic approximation: steps that shrink with each change of direction."""
 
     kind: Literal["kesten"]
@@ -161,7 +166,7 @@ def _distance(prior: PriorConfig) -> float:
     return float(ends[1] - ends[0]) / max(prior.points - 1, 1)
 
 
-class PosteriorConfig(TracksConfig):
+class PosteriorConfig(NumericTracksConfig):
     """The posterior of a psychometric function: the next level is the one whose answer tells most."""
 
     kind: Literal["posterior"]
@@ -259,12 +264,24 @@ def _two_factor_problems(table: PosteriorConfig) -> Iterator[str]:
         yield "start is of one factor; remove it"
 
 
-ProcedureConfig = Annotated[ConstantConfig | UpDownConfig | KestenConfig | PosteriorConfig, Field(discriminator="kind")]
-AdaptiveConfig = UpDownConfig | KestenConfig | PosteriorConfig
+class PairingConfig(TracksConfig):
+    """Active pairing: the next pair is the one after which the order of all items is expected to be known best."""
+
+    kind: Literal["pairing"]
+    spread: Annotated[float, Field(ge=0.1, le=20)] = 2.0
+
+
+NumericConfig = UpDownConfig | KestenConfig | PosteriorConfig
+AdaptiveConfig = NumericConfig | PairingConfig
+ProcedureConfig = Annotated[
+    ConstantConfig | UpDownConfig | KestenConfig | PosteriorConfig | PairingConfig, Field(discriminator="kind")
+]
 
 
 def least_of_track(table: AdaptiveConfig) -> int:
     """The fewest trials that a track can take; as many as the most where only those end it."""
+    if isinstance(table, PairingConfig):
+        return table.trials
     if isinstance(table, PosteriorConfig):
         ends = table.credible_width is not None
         return max(table.least_trials, 1) if ends else table.trials
@@ -273,4 +290,10 @@ def least_of_track(table: AdaptiveConfig) -> int:
 
 def starts_of(table: AdaptiveConfig) -> tuple[float | None, ...]:
     """The level at which each track of a cell begins; `None` where the rule chooses."""
-    return (table.start,) * table.tracks if isinstance(table, PosteriorConfig) else table.starts
+    match table:
+        case PosteriorConfig():
+            return (table.start,) * table.tracks
+        case PairingConfig():
+            return (None,)
+        case _:
+            return table.starts

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from experiments.design.procedures.config import (
     AdaptiveConfig,
     KestenConfig,
+    NumericConfig,
+    PairingConfig,
     PosteriorConfig,
     PriorConfig,
     UpDownConfig,
@@ -22,7 +24,15 @@ _SHAPES = {
 _TARGETS = {"threshold": "its threshold", "width": "its width", "both": "its threshold and width"}
 
 
-def rule_words(table: AdaptiveConfig, levels: Sequence[NumericLevels]) -> str:
+def pairing_words(table: PairingConfig) -> str:
+    """How the next pair follows from the answers: a sentence's end, after “it was chosen after each answer”."""
+    return (
+        "so that the order of all was expected to be known best by the answer (active pairing by Bradley and Terry; "
+        f"scores about 0, SD {table.spread:g} logits)"
+    )
+
+
+def rule_words(table: NumericConfig, levels: Sequence[NumericLevels]) -> str:
     """How the next level follows from the answers: a sentence's end, after “it was chosen after each answer”."""
     match table:
         case UpDownConfig():
@@ -70,14 +80,13 @@ def _prior(prior: PriorConfig) -> str:
 
 def end_words(table: AdaptiveConfig) -> str:
     """When a track ends, as part of a sentence: `of 40 trials`, or at the most so many and until what."""
-    until = [*_ends(table)]
-    if not until:
+    if isinstance(table, PairingConfig) or not (until := [*_ends(table)]):
         return f"of {table.trials} trials"
     least = f", after {table.least_trials} trials at the earliest" if table.least_trials else ""
     return f"of at most {table.trials} trials, which ended {until[0]}{least}"
 
 
-def _ends(table: AdaptiveConfig) -> Iterator[str]:
+def _ends(table: NumericConfig) -> Iterator[str]:
     if isinstance(table, PosteriorConfig):
         if table.credible_width is not None:
             yield f"when the 95 % credible interval of the threshold was narrower than {table.credible_width:g}"

@@ -18,7 +18,6 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, ndtr
 
 from experiments.design.procedures.psychometric import Shares
 from experiments.design.streams import Stream
@@ -97,7 +96,7 @@ def item_posterior(wins: Shares, spread: float) -> tuple[Shares, Shares]:
     compared, own = wins + wins.swapaxes(-1, -2), np.arange(wins.shape[-1])
     scores = np.zeros(wins.shape[:-1])
     for _ in range(_STEPS):
-        share = expit(scores[..., :, None] - scores[..., None, :])
+        share = _share(scores[..., :, None] - scores[..., None, :])
         slope = (wins - compared * share).sum(axis=-1) - scores / spread**2
         weight = compared * share * (1 - share)
         curvature = -weight
@@ -116,11 +115,11 @@ def order_gains(rule: PairingRule, scores: Shares, covariance: Shares) -> Shares
     to_items = covariance[..., one, :] - covariance[..., other, :]
     together = to_items[..., one] - to_items[..., other]
     variance = np.diagonal(together, axis1=-2, axis2=-1)
-    share = expit(apart)
+    share = _share(apart)
     weight = share * (1 - share)
     kept = 1 / (1 + weight * variance)
     after = np.sqrt(np.maximum(variance[..., None, :] - together**2 * (weight * kept)[..., None], 1e-12))
-    expected = expit(apart / np.sqrt(1 + _PROBIT * variance))
+    expected = _share(apart / np.sqrt(1 + _PROBIT * variance))
     doubt = np.zeros_like(apart)
     for chosen, likely in ((1.0, expected), (0.0, 1 - expected)):
         moved = apart[..., None, :] + together * ((chosen - share) * kept)[..., None]
@@ -128,7 +127,16 @@ def order_gains(rule: PairingRule, scores: Shares, covariance: Shares) -> Shares
     return np.asarray(_doubt_of_order(apart / np.sqrt(variance))[..., None] - doubt)
 
 
+def _share(apart: Shares) -> Shares:
+    """How often one item is chosen over another so far below it."""
+    from scipy.special import expit  # noqa: PLC0415 - slow, and whoever only reads a design needs none of it
+
+    return np.asarray(expit(apart))
+
+
 def _doubt_of_order(z: Shares) -> Shares:
+    from scipy.special import ndtr  # noqa: PLC0415 - as above
+
     above = ndtr(z)
     return np.asarray((above * (1 - above)).sum(axis=-1))
 
