@@ -27,6 +27,9 @@ TEN = ("direction", "preference", "voltages", "detection", "stronger", "magnitud
 SETUPS = {name: load_setup(str(path_of(name))) for name in TEN}
 SETUPS["preference"] = changed("preference", laws={"questions": {"comment": {"texts": ("soft",)}}})
 """Whose people say something, so every question has an answer."""
+SETUPS["threshold"] = changed("threshold", procedure={"trials": 6})
+SETUPS["staircase"] = changed("staircase", procedure={"trials": 6, "reversals": 0})
+"""Short tracks, which end with their last trial: every planned trial is felt."""
 
 
 def carried_out(name, results, code="P01", again="ask", **more):
@@ -43,7 +46,7 @@ def answers(name, rows):
     return [{key: row[key] for key in asked if key in row} for row in rows]
 
 
-@pytest.fixture(scope="module", params=TEN)
+@pytest.fixture(scope="module", params=SETUPS)
 def whole(request, tmp_path_factory):
     results = tmp_path_factory.mktemp(request.param)
     finished = carried_out(request.param, results)
