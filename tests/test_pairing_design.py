@@ -19,6 +19,7 @@ from experiments.config.door import ConfigError, checked_table
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of
+from experiments.design.stimuli import settings
 from experiments.load import check_limits, load_gun, load_setup, shipped_folder
 from experiments.rebuild import rebuild
 from experiments.record.journal import read_journal
@@ -80,6 +81,16 @@ def test_items_that_hands_set_differently_are_refused_with_what_differs() -> Non
         ConfigError, match=r"method = vibration has nothing to set, method = \S+ damper off; take levels"
     ):
         check_limits(setup)
+
+
+def test_what_hands_set_is_known_before_the_pair_is() -> None:
+    design = checked_table(DesignConfig, without_none(PAIRS), "f.toml")
+    gun = load_gun(shipped_folder() / "gun-five.toml")
+    assert {settings(design, gun, one.levels_at(0) or ()) for one in plan_of(design, "P01", 1).trials} == {()}
+    damped = {name: one.model_copy(update={"damper": "on"}) for name, one in gun.methods.items()}
+    alike = gun.model_copy(update={"methods": damped})
+    held = {settings(design, alike, one.levels_at(0) or ()) for one in plan_of(design, "P01", 1).trials}
+    assert held == {(("damper", "on"),)}
 
 
 VOLTS = (8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0)

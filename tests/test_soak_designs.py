@@ -44,6 +44,8 @@ SHIPPED = (
     "threshold",
     "staircase",
 )
+DESIGNS = (*SHIPPED, "ranked")
+"""The shipped ones, and pairs that are chosen by the answers."""
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +58,9 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (configs / source.relative_to(shipped_folder())).write_bytes(source.read_bytes())
     for name in SHIPPED:
         (configs / f"{name}.toml").write_text(toml_text(shortened(read_toml(shipped_folder() / f"{name}.toml"))))
+    pairs = shortened(read_toml(shipped_folder() / "pairs.toml"))
+    ranked = pairs | {"design": "ranked", "procedure": {"kind": "pairing", "of": ["method"], "trials": 8}}
+    (configs / "ranked.toml").write_text(toml_text(ranked))
     return place
 
 
@@ -88,7 +93,7 @@ def keys_of(name: str, place: Path) -> Callable[[int], str]:
     return lambda trial: keys[trial % len(keys)]
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", DESIGNS)
 def test_each_design_is_run_by_real_keys_to_its_end(name: str, place: Path, soak: Soak) -> None:
     began_s = time.monotonic()
     run = words(place / "configs", name, "--participant", "P01")
@@ -136,7 +141,7 @@ def typed() -> Callable[[str, int], str]:
     return reply
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", DESIGNS)
 def test_each_design_is_typed_at_a_terminal_killed_halfway_and_gone_on_with(name: str, place: Path, soak: Soak) -> None:
     began_s = time.monotonic()
     config = place / "configs" / f"{name}.toml"
@@ -162,11 +167,12 @@ def test_what_they_leave_is_analysed_drawn_and_exported(place: Path, soak: Soak)
         done = subprocess.run(warm(*command), cwd=place, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     report = (place / "analysis" / "report.md").read_text(encoding="utf-8")
-    drawn = [name for name in SHIPPED if (place / "analysis" / "figures" / f"figure-{name}.png").exists()]
-    assert set(drawn) == set(SHIPPED) - {"direction", "preference"}  # their own figures stand under other names
-    assert all(load_setup(name).config.title.rstrip("?") in report for name in drawn)
+    drawn = [name for name in DESIGNS if (place / "analysis" / "figures" / f"figure-{name}.png").exists()]
+    assert set(drawn) == set(DESIGNS) - {"direction", "preference"}  # their own figures stand under other names
+    titles = {load_setup(str(place / "configs" / f"{name}.toml")).config.title for name in drawn}
+    assert all(title.rstrip("?") in report for title in titles)
     exported = {path.name.split("_task-")[1].split("_")[0] for path in (place / "results" / "bids").rglob("*_beh.tsv")}
-    assert exported == set(SHIPPED)
+    assert exported == set(DESIGNS)
     soak(
         "report, figures and BIDS of them all",
         f"{len(exported)} tasks exported, {len(drawn)} own figures",

@@ -51,7 +51,7 @@ def planned_run(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) 
 
 def workload(design: DesignConfig, plan: Plan, gun: GunConfig | None = None) -> PlannedRun:
     """What a plan comes to, whether or not the design allows it."""
-    trials = [trial.with_chosen(design.last_choice) if trial.track else trial for trial in plan.trials]
+    trials = plan.trials
     rests_s = [_rest_s(design, before, trial) for before, trial in pairwise(trials)]
     shortest = _shortest(design, trials)
     return PlannedRun(

@@ -29,7 +29,7 @@ from experiments.design.language import (
     Level,
     shown_level,
 )
-from experiments.design.plan import Condition, Trial
+from experiments.design.plan import CHOSEN, Condition, Trial
 from experiments.design.planning import groups
 
 _GUN_NUMBERS = tuple(
@@ -75,8 +75,12 @@ def by_hand(design: DesignConfig) -> tuple[str, ...]:
 
 
 def settings(design: DesignConfig, gun: GunConfig, levels: Condition) -> tuple[tuple[str, str], ...]:
-    """What is set by hand for a cell, as the experimenter reads it: the method's damper, unless a factor says how."""
+    """What is set by hand for a cell, as the experimenter reads it: the method's damper, unless a factor says how.
+
+    Of a method that is not chosen yet it is that of any, as `limits` lets no others through.
+    """
     names, method = by_hand(design), dict(levels).get(METHOD_FACTOR)
+    method = design.methods[0] if method == CHOSEN else method
     held = {} if method is None else dict(damper(gun, str(method)))
     return tuple((held | {name: design.factors[name].label(level) for name, level in levels if name in names}).items())
 

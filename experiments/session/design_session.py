@@ -177,9 +177,8 @@ class _Script:
 
     def _by_hand(self, trial: Trial, interval: int) -> object:
         """What hands do for an interval; `None` where nothing is felt, and so nothing is to be done."""
-        felt = self._as_chosen(trial)
-        levels = felt.levels_at(interval)
-        return None if levels is None else (felt.direction_at(interval), settings(self.design, self.gun, levels))
+        levels = trial.levels_at(interval)
+        return None if levels is None else (trial.direction_at(interval), settings(self.design, self.gun, levels))
 
     def _held(self, trial: Trial, interval: int) -> object:
         """What hands do before an interval; before an empty one as for one that is not, which it must not give away."""
@@ -188,14 +187,9 @@ class _Script:
 
     def _settings(self, trial: Trial, interval: int) -> tuple[tuple[str, str], ...]:
         """What is set by hand: of an empty interval, as for one that is not; of a catch trial what does not vary."""
-        felt = self._as_chosen(trial)
-        held = (felt.levels_at(place) for place in (interval, *range(len(trial.intervals))))
+        held = (trial.levels_at(place) for place in (interval, *range(len(trial.intervals))))
         levels = next((levels for levels in held if levels is not None), trial.levels)
         return settings(self.design, self.gun, levels)
-
-    def _as_chosen(self, trial: Trial) -> Trial:
-        """A trial with levels that could be chosen for it: hands set the same for all of them."""
-        return trial.with_chosen(self.design.last_choice) if trial.track else trial
 
     def _instruction(self, trial: Trial) -> str:
         return self.design.factors[INSTRUCTION_FACTOR].texts[trial.instruction] if trial.instruction else ""
