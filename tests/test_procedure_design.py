@@ -221,5 +221,11 @@ def test_the_experimenter_sees_a_level_only_where_the_design_allows_it(shown: bo
     fired = next(one for one, _ in told if isinstance(one, FireShot))
     level = dict(fired.chosen)["voltage_V"]
     assert texts.chosen_text(told, step.trial) == (f"voltage_V = {level:g}" if shown else "")
-    assert texts.track_text(plan, told, step.trial) == f"Track {step.trial.track}: 0 of at most 40 trials"
-    assert texts.place_text(plan, step.trial).startswith("Trial 1 of at most 80")
+    assert texts.track_text(plan, told, step.trial) == f"Track {step.trial.track}: 0 of 40 trials"
+    assert texts.place_text(plan, step.trial).startswith("Trial 1 of 80")
+
+
+def test_trials_are_at_most_so_many_where_a_track_may_be_over_sooner() -> None:
+    plan = plan_of(STAIRCASE.config, "P01", 1)
+    assert texts.place_text(plan, plan.trials[0]).startswith("Trial 1 of at most 100")
+    assert texts.track_text(plan, [], plan.trials[0]).endswith("0 of at most 50 trials")

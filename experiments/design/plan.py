@@ -80,6 +80,7 @@ _BLANKS: dict[str, object] = {
     "interval": 0,
     "gap_s": 0.0,
     "later": False,
+    "may_end_early": False,
     "distinct": False,
 }
 """What most trials and steps do not have, by the name of its field."""
@@ -166,7 +167,8 @@ class Plan:
     """All trials of one participant in one experiment, and the seed they came from.
 
     `order_row` is the row of the balancing square; `None` if the order is random. `group`: which combination of the
-    levels that vary between people is this participant's, counted from 0.
+    levels that vary between people is this participant's, counted from 0. `may_end_early`: tracks may be over before
+    all of their trials are done.
     """
 
     experiment: str
@@ -176,6 +178,7 @@ class Plan:
     trials: tuple[Trial, ...]
     group: int = 0
     practice: bool = False
+    may_end_early: bool = False
     format: int = PLAN_FORMAT
 
     @property

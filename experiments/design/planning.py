@@ -15,6 +15,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.contents import Content, Streams, cells, in_order, session_cells, trial_contents
 from experiments.design.language import INSTRUCTION_FACTOR, BlockOrder, Level, shown_level
 from experiments.design.plan import Condition, Plan, Trial, square_rows
+from experiments.design.procedures.config import least_of_track
 from experiments.design.streams import Stream
 from experiments.design.track_planning import track_parts
 
@@ -68,6 +69,7 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
         order_row=row,
         group=group,
         trials=tuple(_with_own_tracks(trials)),
+        may_end_early=design.adaptive is not None and least_of_track(design.adaptive) < design.adaptive.trials,
     )
 
 

@@ -33,8 +33,7 @@ def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
 def place_text(plan: Plan, trial: Trial) -> str:
     """Where a trial stands: in its session, set and run."""
     in_session = [other for other in plan.trials if other.session == trial.session]
-    most = "at most " if any(other.track for other in in_session) else ""  # a track may be over sooner
-    where = f"Trial {trial.trial} of {most}{len(in_session)}"
+    where = f"Trial {trial.trial} of {_at_most(plan)}{len(in_session)}"
     sessions, sets = plan.trials[-1].session, in_session[-1].set
     return (
         where
@@ -44,11 +43,15 @@ def place_text(plan: Plan, trial: Trial) -> str:
 
 
 def track_text(plan: Plan, told: History, trial: Trial) -> str:
-    """How far the adaptive track of a trial is, which may be over sooner; empty of a trial without one."""
+    """How far the adaptive track of a trial is; empty of a trial without one."""
     if not trial.track:
         return ""
     own = {other for other in plan.trials if other.track == trial.track}
-    return f"Track {trial.track}: {len(answered(told) & own)} of at most {len(own)} trials"
+    return f"Track {trial.track}: {len(answered(told) & own)} of {_at_most(plan)}{len(own)} trials"
+
+
+def _at_most(plan: Plan) -> str:
+    return "at most " if plan.may_end_early else ""
 
 
 def chosen_text(told: History, trial: Trial) -> str:

@@ -263,7 +263,8 @@ class Bars(QtWidgets.QWidget):
         """Show what is so now."""
         for bar, one in zip(self._bars, progress.trials_done(seen), strict=True):
             bar.setAccessibleName(one.what)
-            bar.setFormat(f"{one.what}: %v of {'at most ' if one.at_most else ''}%m")
+            at_most = "at most " if seen.about.plan.may_end_early else ""
+            bar.setFormat(f"{one.what}: %v of {at_most}%m")
             bar.setMaximum(one.planned)
             bar.setValue(one.count)
 
@@ -274,8 +275,8 @@ def _times(seen: Seen, timing: RunTiming) -> str:
         return elapsed
     about = seen.about
     ahead = Ahead(design=about.setup.config, plan=about.plan, told=seen.told, position=seen.position, now_s=seen.now_s)
-    at_most = any(trial.track for trial in about.plan.trials)
-    return f"{elapsed}\nEnds {end_text(remaining_s(ahead, timing), datetime.now(), at_most=at_most)}"
+    ends = end_text(remaining_s(ahead, timing), datetime.now(), at_most=about.plan.may_end_early)
+    return f"{elapsed}\nEnds {ends}"
 
 
 def _fill(shown: QtWidgets.QListWidget, lines: list[str]) -> None:

@@ -21,12 +21,11 @@ from experiments.session.steps import Outcome, Step
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialCount:
-    """How many trials are done of those planned, and of what. `at_most`: adaptive tracks may be over sooner."""
+    """How many trials are done of those planned, and of what."""
 
     what: str
     count: int
     planned: int
-    at_most: bool = False
 
 
 def trials_done(seen: Seen) -> list[TrialCount]:
@@ -43,8 +42,7 @@ def trials_done(seen: Seen) -> list[TrialCount]:
 
 
 def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:
-    count, tracks = sum(trial in finished for trial in trials), any(trial.track for trial in trials)
-    return TrialCount(what=what, count=count, planned=len(trials), at_most=tracks)
+    return TrialCount(what=what, count=sum(trial in finished for trial in trials), planned=len(trials))
 
 
 STRIP = 40
