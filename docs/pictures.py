@@ -23,7 +23,7 @@ from experiments.load import load_setup
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from recoil.config_files import new_study
-from tests import warm_start, watched_start
+from tests import figure_files, warm_start, watched_start
 from tests.at_display import AtConsole, AtDisplay, virtual_display
 
 OUT = Path(__file__).parent / "pictures"
@@ -213,6 +213,22 @@ def ratings(folder: Path, display: str) -> None:
         shoot(screen, "finished")
 
 
+# a threshold
+
+
+def threshold(folder: Path, display: str) -> None:
+    """The shipped threshold at the console, and its tracks as they are drawn."""
+    command = ["run", "threshold", "--screen", "console", "--participant", "P01", "--results", "results", "--seed", 4]
+    with AtConsole(command, folder, display) as screen:
+        screen.to("preparing", trial=5)
+        shoot(screen, "threshold")
+    for code in ("S01", "S02", "S03"):
+        _recoil(f"run threshold --participant {code} --screen synthetic --seed 1 --results {folder}/threshold")
+    _recoil(f"analyze {folder}/threshold --out {folder}/threshold-analysis")
+    drawn = folder / "threshold-analysis" / "figures" / "figure-threshold-response-tracks.png"
+    keep(Image.open(drawn), "figure-threshold-tracks", 1000)
+
+
 # figures
 
 
@@ -242,12 +258,17 @@ def _page(address: str, png: Path, size: str) -> None:
 
 
 def main() -> None:
-    """All pictures, or those of the parts that are named: lab_day, ratings, figures."""
-    parts: dict[str, Callable[..., None]] = {"lab_day": lab_day, "ratings": ratings, "figures": figures}
+    """All pictures, or those of the parts that are named."""
+    parts: dict[str, Callable[..., None]] = {
+        "lab_day": lab_day,
+        "ratings": ratings,
+        "threshold": threshold,
+        "figures": figures,
+    }
     OUT.mkdir(exist_ok=True)
     with ExitStack() as stack:
         server = stack.enter_context(tempfile.TemporaryDirectory())
-        os.environ |= {warm_start.FOLDER: server, warm_start.OWNER: str(os.getpid())}
+        os.environ |= {warm_start.FOLDER: server, warm_start.OWNER: str(os.getpid()), figure_files.ASKED: "1"}
         for name in sys.argv[1:] or parts:
             _make(parts[name])
 

@@ -25,7 +25,7 @@ from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record import storage
 from experiments.run import RunRequest
-from experiments.screens.console import widgets
+from experiments.screens.console import progress, widgets
 from experiments.session.states import State
 from tests.at_controls import short_direction
 from tests.warm_start import warm
@@ -120,6 +120,16 @@ def slow_disk(syncs: threading.Event) -> None:
     storage.sync = slow
 
 
+def undrawable(guns: list[FaultyGun]) -> None:
+    """What comes next cannot be shown any more from the second shot on."""
+    coming = progress.coming
+
+    def failing(seen: Any) -> list[str]:
+        return [str(1 / 0)] if guns[0].shots > 1 else coming(seen)
+
+    progress.coming = failing
+
+
 class Watcher:
     """Ticks in the window's thread, remembers what was shown, presses the emergency stop, and closes what is halted.
 
@@ -178,6 +188,8 @@ def program(case: str, folder: Path) -> dict[str, Any]:
     syncs = threading.Event()
     if case == "slow-disk":
         slow_disk(syncs)
+    if case == "undrawable":
+        undrawable(guns)
 
     request = RunRequest(setup=SETUP, participant_id="P01", results=folder, seed=1, screen="console", visual=True)
     console = Console(request, RealClock())

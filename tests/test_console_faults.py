@@ -139,3 +139,12 @@ def test_a_signal_that_comes_before_the_run_has_begun_ends_it_with_nothing_fired
     assert (seen["stopped"], seen["shots"]) == ("SIGTERM", 0)
     assert contents.records[-1].kind == "stopped"
     assert not any(row["response"] for row in rows)
+
+
+def test_a_window_that_can_no_longer_be_drawn_stops_the_run_instead_of_standing_still(case: Case) -> None:
+    seen, contents, _ = case("undrawable")
+    assert seen["stopped"].startswith(
+        "the console failed: ZeroDivisionError: division by zero (faulty_console.py, line"
+    )
+    assert contents.records[-1].kind == "stopped"
+    check_answers(contents)

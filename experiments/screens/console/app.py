@@ -25,7 +25,14 @@ from experiments.screens.console import view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.window import ConsoleWindow
-from experiments.screens.console.windows import finish_tone, hear_of_loss, on_loss, open_as_left, signals_to
+from experiments.screens.console.windows import (
+    errors_to,
+    finish_tone,
+    hear_of_loss,
+    on_loss,
+    open_as_left,
+    signals_to,
+)
 from experiments.screens.synthetic import synthetic_participant_of
 from experiments.session import events
 from experiments.session.events import Hand
@@ -103,7 +110,7 @@ class Console:
         self.observer: Any = None
         self._result: Finished | None = None
         self._error: BaseException | None = None
-        self._leaving = ""
+        self._leaving, self._failed = "", False
         self._opened, self._over = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="run")
         self._loop, self._bridge = QEventLoop(), _Bridge()
@@ -116,7 +123,7 @@ class Console:
 
         The window stays open at the end until it is closed. Without a window, an error is raised at once.
         """
-        with on_loss(self._lose_display), signals_to(self._leave), _quick_threads():
+        with on_loss(self._lose_display), signals_to(self._leave), errors_to(self._fail), _quick_threads():
             self._thread.start()
             self._loop.exec()
             self._thread.join()
@@ -137,6 +144,9 @@ class Console:
         self._opened.set()
 
     def _take(self, message: view.Message) -> None:
+        if self._failed and isinstance(message, view.Ended):
+            self._loop.quit()
+            return
         if self.window is not None and isinstance(message, view.Began):
             self.window.begin(message.live, self._controls(self.window, message.live))
         if self.window is not None:
@@ -164,6 +174,16 @@ class Console:
             self.live.offer(events.Stop(reason=reason))
         if self.window is not None and self.window.ended is not None:
             self.window.close()
+
+    def _fail(self, error: str) -> None:
+        """Stop the run and go, once: a window that cannot do what it has to may show what is not so."""
+        if self._failed:
+            return
+        self._failed = True
+        self._opened.set()  # the run waits for its window no longer
+        self._leave(f"the console failed: {error}")
+        if self._over.is_set():
+            self._loop.quit()
 
     def _lose_display(self) -> None:
         """End the run in order although nobody sees it; within `_END_S`."""

@@ -1,7 +1,8 @@
 """What every window of the console needs of the system: its place, its keys, signals, a tone; and the display's loss.
 
 When the display is lost, Qt says so in a warning, then calls `exit`, which can hang. The warning is heard here, so that
-the run ends in order first. Signals end a window in order too: an exception out of a Qt slot would end the process.
+the run ends in order first. Signals end a window in order too, and so do errors: an exception out of a Qt slot would
+end the process, or be printed and no more.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ import re
 import signal
 import sys
 import threading
+import traceback
 from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from types import FrameType
+from pathlib import Path
+from types import FrameType, TracebackType
 from typing import Any, Protocol
 
 from PyQt6 import QtCore
@@ -136,6 +139,22 @@ def signals_to(leave: Callable[[str], None] | None = None) -> Iterator[list[str]
     finally:
         for number, before in handler.before.items():
             signal.signal(number, before)
+
+
+@contextmanager
+def errors_to(told: Callable[[str], None]) -> Iterator[None]:
+    """Have an error in what Qt calls told, with its place: printed alone, it would leave a window that stands still."""
+    before = sys.excepthook
+
+    def tell(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        *_, (frame, line) = traceback.walk_tb(trace)
+        told(f"{kind.__name__}: {error} ({Path(frame.f_code.co_filename).name}, line {line})")
+
+    sys.excepthook = tell
+    try:
+        yield
+    finally:
+        sys.excepthook = before
 
 
 @lru_cache(maxsize=1)
