@@ -144,7 +144,8 @@ def test_synthetic_participants_are_ranked_as_they_were_made(logs: Path) -> None
     assert not recoil.read_logs(logs).problems
     (pairs,) = [one.pairs for one in found.designs["pairs"].questions.values()]
     assert pairs is not None
-    assert found.designs["pairs"].questions["rather"].preferred is None  # who meets equals is chosen half the time
+    question = found.designs["pairs"].questions["rather"]
+    assert (question.preferred, question.drawn) == (None, False)  # who meets equals is chosen half the time
     for condition in pairs.conditions:
         assert condition.trials == 4 * 14
         assert spearmanr([one.score for one in condition.scores[0].scores], VOLTS).statistic > 0.9

@@ -31,7 +31,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR, Level, QuestionConfig, shown_level
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import runs_of_groups
-from experiments.design.procedure_problems import has_success
+from experiments.design.procedure_problems import chooses_of_pair, has_success
 from experiments.tasks.questions import chance, correct_columns
 
 
@@ -135,8 +135,14 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         chance=chance(question),
         preferred=_preferred(design, name, question, scored),
         scale=_scale(question),
-        held=bool(design.adapted) and has_success(question),
+        held=_is_held(design, question),
     )
+
+
+def _is_held(design: DesignConfig, question: QuestionConfig) -> bool:
+    """Whether what was answered is where a procedure held it: near its target, or near a half of a pair's items."""
+    of_pairs = design.trial.kind == "pair" and chooses_of_pair(question)
+    return bool(design.adapted) and (of_pairs or has_success(question))
 
 
 def _scale(question: QuestionConfig) -> str | None:

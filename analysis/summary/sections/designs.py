@@ -172,11 +172,17 @@ def _listed(found: DesignSummary, name: str, levels: Sequence[Level]) -> str:
 
 
 def _held(found: DesignSummary) -> Iterator[str]:
-    held = [asked for asked, question in found.questions.items() if question.held]
+    held = [asked for asked, question in found.questions.items() if question.held and question.pairs is None]
     if held:
         yield (
             f"Levels were chosen by the answers, so that the share of successes in {' and '.join(held)} is where the "
             "procedure held it: thresholds tell what differs."
+        )
+    pairs = [asked for asked, question in found.questions.items() if question.held and question.pairs is not None]
+    if pairs:
+        yield (
+            f"Pairs were chosen by the answers to {' and '.join(pairs)}, so how often an item was chosen is of little "
+            "worth: most met their equals. Scores tell what differs."
         )
 
 
