@@ -17,6 +17,7 @@ guess: only `exponent` has a source, three numbers are fitted to three rates (`p
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -98,10 +99,10 @@ def percept_of_course(
     course = felt_course(times, force_N, leak_s)
     parts = [shot.firing_end_s, shot.reset_end_s]
     border_s = min((part for part in parts if part is not None), default=math.inf)
-    early = [x for t, x in zip(times, course, strict=True) if t <= border_s + _SAME_S]
-    late = [x for t, x in zip(times, course, strict=True) if t > border_s + _SAME_S]
+    cut = bisect_right(times, border_s + _SAME_S)
+    early, late = course[:cut], course[cut:]
     if shot.reset_end_s is not None and shot.impact_speed_m_s is not None:
-        before = max((i for i, t in enumerate(times) if t <= shot.reset_end_s + _SAME_S), default=0)
+        before = max(0, bisect_right(times, shot.reset_end_s + _SAME_S) - 1)
         late.append(course[before] + magnet_mass_kg * shot.impact_speed_m_s / leak_s)
     reaction = -min([*early, *late])
     return Percept(first=max(0.0, *early), reaction=max(0.0, reaction), second=max([0.0, *late]))
