@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -23,10 +24,12 @@ from device.physics import (
     simulate,
     simulate_batch,
 )
+from device.physics.equations import MAX_WORK, STATUSES, ShotResult, ShotState, StepSeries, pack
 from device.physics.shot import highest_rate_Hz
+from device.physics.shot import shoot as shoot_into
 from device.physics.traces import energy_balance
 from tests.conftest import Soak
-from tests.extreme_guns import BREAK_AWAY_V, EXTREMES, defects, gun_of, numbers, pair, shoot
+from tests.extreme_guns import BREAK_AWAY_V, EXTREMES, SPREAD, defects, gun_of, numbers, pair, shoot
 from tests.golden_shots import SHOTS
 from tests.physics_claims import BARE, DAMPED, VARIANTS, motor_peak_N, share_after_turn, slide_mm
 from tests.shot_trains import repeated
@@ -157,6 +160,30 @@ def test_extremes(soak: Soak) -> None:
     soak("extremes: a right answer or a named status, no NaN, no hang", each, "8 s each", how)
     assert set(counts) <= {"home", "no-break-away", "stuck", "not-home"}
     assert slowest < 8
+
+
+@pytest.mark.parametrize(("decades", "count"), [(3, 3000), (12, 300)])
+def test_work_far_from_the_papers_gun(decades: int, count: int, soak: Soak) -> None:
+    rng, seconds, works, counts = np.random.default_rng(1), list[float](), list[int](), Counter[str]()
+    for _ in range(count):
+        options = dict(zip(("drive_off", "emf"), VARIANTS[rng.integers(len(VARIANTS))], strict=True))
+        numbers_of = {name: getattr(BARE, name) * 10 ** rng.uniform(-decades / 2, decades / 2) for name in SPREAD}
+        series, result, begun = StepSeries(), ShotResult(), time.process_time()
+        with contextlib.suppress(ArithmeticError):  # beyond floats
+            shoot_into(pack(GunParameters(**options, **numbers_of)), ShotState(), series, result)
+        seconds.append(time.process_time() - begun)
+        works.append(series.work)
+        counts[STATUSES[result.status]] += 1
+    middle, late, last = (1e3 * np.quantile(seconds, part) for part in (0.5, 0.99, 1.0))
+    over = sum(second > 0.05 for second in seconds)
+    each = ", ".join(f"{number} {name}" for name, number in counts.most_common())
+    soak(
+        f"interpreted, guns of {decades} decades about the paper's: CPU time a shot",
+        f"median {middle:.1f} ms, 99 of 100 below {late:.0f} ms, longest {last:.0f} ms; {over} of {count:,} over 50 ms",
+        "50 ms of 3 decades, 1 s of 12",
+        f"most work {max(works):,} of {MAX_WORK:,}; {each}",
+    )
+    assert max(works) < MAX_WORK + 2000  # what one segment may add
 
 
 def test_re_firing(soak: Soak) -> None:

@@ -79,6 +79,10 @@ def _callees_first(function: FunctionType) -> Functions:
 _ONCE = frozenset(["shoot", "shoot_on", "advance", "coil_step"])
 """Each called in one place, and holding nearly all code: copied in before machine code is made of them, which else is
 made, and made fast, of all that code at each of these levels: half of the compiler's time."""
+_SELDOM = frozenset(
+    ["bernstein_over", "halve", "first_crossing", "peak_force", "expand_creeping", "expand_slaved", "powered_arc"]
+)
+"""Called seldom or from many places, and long: the compiler may leave them where they are."""
 
 
 @lru_cache(maxsize=1)
@@ -96,8 +100,9 @@ def machine_code() -> Callable[[Records, Records], None]:
         space = function.__globals__ | {name: twins[one] for name, one in called.items()}
         twin = FunctionType(function.__code__, space)
         twin.__qualname__ = f"{function.__name__}_{_digest(functions)}"  # the compiler's cache goes by it
-        # all that is called is copied in: half the time, since a call counts the references to each array
-        how: dict[str, Any] = {"inline": "always"} if function.__name__ in _ONCE else {"forceinline": not entry}
+        # what is called is copied in: half the time, since a call counts the references to each array
+        seldom = entry or function.__name__ in _SELDOM
+        how: dict[str, Any] = {"inline": "always"} if function.__name__ in _ONCE else {"forceinline": not seldom}
         how |= {"no_cpython_wrapper": not entry, "no_cfunc_wrapper": not entry}  # nobody else calls them
         twins[function] = numba.njit(error_model="numpy", cache=entry, nogil=entry, **how)(twin)
     return twins[each]  # type: ignore[no-any-return]

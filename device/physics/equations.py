@@ -23,6 +23,9 @@ HORIZON_S = 10.0
 """Where a shot that has not come to rest is given up."""
 MAX_SEGMENTS = 20_000
 """The most segments of one shot, steps and closed forms together; a plain shot has about 20."""
+MAX_WORK = 70_000
+"""The most work of one shot: its segments, passes over series that settle, and pieces of steps in which roots are
+looked for. It takes about a second, interpreted; a plain shot has about 30."""
 
 FULL, NO_INDUCTANCE, CLOSED_FORM, BALLISTIC = range(4)
 """The models; those without inductance have L = 0 among their constants."""
@@ -99,6 +102,8 @@ class ShotState:
     span: float = 0.0  # of the last one
     used: float = 0.0  # how much of it, before its event
     transient_until: float = 0.0  # from then on the current only follows the motion
+    creeping: bool = False  # whether speed and current follow the position
+    creeping_from: float = 0.0  # when to look next whether they do
     until: float = HORIZON_S
 
 
@@ -108,7 +113,7 @@ def _zeros() -> list[float]:
 
 @dataclass(slots=True)
 class StepSeries:
-    """Taylor coefficients over one step in the coil, in parts of its span, and room for two polynomials."""
+    """Taylor coefficients over one step in the coil, in parts of its span, and room for a polynomial in two bases."""
 
     x: list[float] = field(default_factory=_zeros)
     v: list[float] = field(default_factory=_zeros)
@@ -116,6 +121,8 @@ class StepSeries:
     grip: list[float] = field(default_factory=_zeros)
     other: list[float] = field(default_factory=_zeros)  # whose roots are looked for
     bernstein: list[float] = field(default_factory=_zeros)
+    beyond: list[float] = field(default_factory=_zeros)  # the other half of an interval
+    work: int = 0  # how often a series was made, or turned into another basis
 
 
 @dataclass(slots=True)

@@ -8,10 +8,11 @@ Where there are more, the interval is halved.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
-from device.physics.equations import ORDER, Coefficients
+from device.physics.equations import ORDER, Coefficients, StepSeries
 
-PER_BINOMIAL = tuple(1.0 / math.comb(ORDER, k) for k in range(ORDER + 1))
 _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing
 
 
@@ -45,17 +46,45 @@ def lower_bound(c: Coefficients, sign: float) -> float:
     return even + odd
 
 
-def to_bernstein(c: Coefficients, b: list[float]) -> None:
-    """The Bernstein coefficients over [0, 1]: b_j = sum over k <= j of C(j, k)/C(n, k) c_k."""
-    for k in range(ORDER + 1):
-        b[k] = c[k] * PER_BINOMIAL[k]
-    for low in range(1, ORDER + 1):
-        for j in range(ORDER, low - 1, -1):
-            b[j] += b[j - 1]
+def _to_bernstein() -> list[str]:
+    """b_j = sum over k <= j of C(j, k)/C(n, k) c_k."""
+    scaled = [f"b{k} = c[{k}] * {1.0 / math.comb(ORDER, k)!r}" for k in range(ORDER + 1)]
+    summed = [f"b{j} += b{j - 1}" for low in range(1, ORDER + 1) for j in range(ORDER, low - 1, -1)]
+    return ["b, c = w.bernstein, w.other", *scaled, *summed]
 
 
-def restrict(b: list[float], low: float, high: float) -> None:
+def _halve() -> list[str]:
+    """De Casteljau's scheme at the middle."""
+    lines = ["b, beyond = w.bernstein, w.beyond", *(f"b{j} = b[{j}]" for j in range(ORDER + 1))]
+    for r in range(1, ORDER + 1):
+        lines.append(f"beyond[{ORDER + 1 - r}] = b{ORDER}")
+        lines += [f"b{j} = 0.5 * (b{j - 1} + b{j})" for j in range(ORDER, r - 1, -1)]
+    return [*lines, f"beyond[0] = b{ORDER}"]
+
+
+def from_text(name: str, text: str) -> Any:
+    """A function from its text, written out: in loops, bookkeeping takes most of the time."""
+    space: dict[str, Any] = {}
+    exec(text, space)  # noqa: S102 - our own text
+    return space[name]
+
+
+def _of_series(name: str, lines: list[str]) -> Callable[[StepSeries], None]:
+    """A function of the series that leaves b in their `bernstein`."""
+    stored = (f"b[{j}] = b{j}" for j in range(ORDER + 1))
+    function: Callable[[StepSeries], None] = from_text(name, "\n    ".join([f"def {name}(w):", *lines, *stored]))
+    return function
+
+
+to_bernstein = _of_series("to_bernstein", _to_bernstein())
+"""The Bernstein coefficients over [0, 1] of the polynomial in `other`."""
+halve = _of_series("halve", _halve())
+"""Those over the first half of their interval in place of those over all of it; the second half's go `beyond`."""
+
+
+def restrict(w: StepSeries, low: float, high: float) -> None:
     """The Bernstein coefficients over [low, high] in place of those over [0, 1] (de Casteljau, twice)."""
+    b = w.bernstein
     for r in range(1, ORDER + 1):
         for j in range(ORDER, r - 1, -1):
             b[j] = (1.0 - high) * b[j - 1] + high * b[j]
@@ -63,6 +92,14 @@ def restrict(b: list[float], low: float, high: float) -> None:
     for r in range(1, ORDER + 1):
         for j in range(ORDER + 1 - r):
             b[j] = (1.0 - t) * b[j] + t * b[j + 1]
+
+
+def bernstein_over(w: StepSeries, low: float, high: float) -> None:
+    """The Bernstein coefficients over [low, high] of the polynomial in `other`."""
+    w.work += 1
+    to_bernstein(w)
+    if low > 0.0 or high < 1.0:
+        restrict(w, low, high)
 
 
 def sign_changes(b: Coefficients) -> int:
@@ -76,19 +113,12 @@ def sign_changes(b: Coefficients) -> int:
     return changes
 
 
-def changes_between(c: Coefficients, b: list[float], low: float, high: float) -> int:
-    """The changes of sign over [low, high]: an upper bound for the number of roots there, and exact for 0 and 1."""
-    to_bernstein(c, b)
-    if low > 0.0 or high < 1.0:
-        restrict(b, low, high)
-    return sign_changes(b)
+def bracketed_root(w: StepSeries, low: float, high: float) -> float:
+    """The one root between `low` and `high` of the polynomial in `other`: Newton's method, kept inside by halving.
 
-
-def bracketed_root(c: Coefficients, b: Coefficients, low: float, high: float) -> float:
-    """The one root between `low` and `high`: Newton's method, kept inside the bracket by halving it.
-
-    `b` holds the Bernstein coefficients over the bracket: the polygon of them crosses 0 near the root.
+    The polygon of the Bernstein coefficients over the bracket crosses 0 near the root.
     """
+    c, b = w.other, w.bernstein
     sign = 1.0 if b[0] > 0.0 or (b[0] == 0.0 and b[ORDER] < 0.0) else -1.0
     s = low + (high - low) * polygon_root(b)
     for _ in range(80):
@@ -125,16 +155,33 @@ def polygon_root(b: Coefficients) -> float:
     return 0.5
 
 
-def first_crossing(c: Coefficients, b: list[float]) -> float:
-    """The first s in (0, 1] where a polynomial that is above 0 just after s = 0 falls below it; 2 if none."""
-    low, width = 0.0, 1.0
+def first_crossing(w: StepSeries) -> float:
+    """The first s in (0, 1] where the polynomial in `other`, above 0 just after s = 0, falls below it; 2 if none."""
+    low, width, halved = 0.0, 1.0, False
+    bernstein_over(w, low, width)
     while low < 1.0:
-        high = min(low + width, 1.0)
-        changes = changes_between(c, b, low, high)
-        if changes == 1 or (changes > 1 and width <= _SMALLEST and b[ORDER] < 0.0):
-            return bracketed_root(c, b, low, high)
-        if changes == 0 or width <= _SMALLEST:
-            low, width = high, 2.0 * width
+        changes, high = sign_changes(w.bernstein), min(low + width, 1.0)
+        if changes == 1 or (changes > 1 and width <= _SMALLEST and w.bernstein[ORDER] < 0.0):
+            return bracketed_root(w, low, high)
+        if changes > 1 and width > _SMALLEST:
+            w.work += 1
+            halve(w)
+            width, halved = 0.5 * width, True
         else:
-            width = 0.5 * width
+            width = next_piece(w, high, 1.0, width, halved)
+            low, halved = high, False
     return 2.0
+
+
+def next_piece(w: StepSeries, low: float, end: float, width: float, halved: bool) -> float:
+    """The Bernstein coefficients over the piece that begins at `low`, and its width, which may go past the `end`.
+
+    It is as wide as the one before it if that was halved just now, whose other half lies ready, else twice as wide.
+    """
+    if halved:
+        for j in range(ORDER + 1):
+            w.bernstein[j] = w.beyond[j]
+        return width
+    if low < end:
+        bernstein_over(w, low, min(low + 2.0 * width, end))
+    return 2.0 * width

@@ -26,6 +26,7 @@ from device.physics.equations import (
     HOME,
     HORIZON_S,
     MAX_SEGMENTS,
+    MAX_WORK,
     NO_BREAK_AWAY,
     NOT_HOME,
     ORDER,
@@ -47,7 +48,15 @@ from device.physics.equations import (
     pack,
     spring_force,
 )
-from device.physics.polynomial import bracketed_root, changes_between, lower_bound, value_at
+from device.physics.polynomial import (
+    bernstein_over,
+    bracketed_root,
+    halve,
+    lower_bound,
+    next_piece,
+    sign_changes,
+    value_at,
+)
 from device.physics.segments import advance, enter, pulse_off, pulse_on
 
 _EQUAL = 1e-14  # relative: forces closer than this are one
@@ -63,17 +72,19 @@ def shoot(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None:
 def shoot_on(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None:
     """One shot into `out`, from the motion and current in `s` to the end that `s` gives it, where it leaves `s`."""
     forget(out)
+    w.work = 0
     out.max_displacement_m, s.heading = s.x, 0.0
     pulse_on(p, s)
     enter(p, s, BREAK_AWAY)
     event = GIVEN_UP
     for _ in range(MAX_SEGMENTS):
         event = advance(p, s, w)
+        w.work += 1
         note(p, s, w, event, out)
         if p.model == BALLISTIC and out.stage == OVER:
             event = coast(p, s, out)
             break
-        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until):
+        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until) or w.work > MAX_WORK:
             break
         if event == DRIVE_CHANGE:
             pulse_off(p, s)
@@ -116,7 +127,6 @@ def note_recoil(p: Constants, s: ShotState, w: StepSeries, event: int, out: Shot
 
 def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
     """The largest force of a step, if above `best`, which is at least that of its ends: a top is a root of dF/dt."""
-    used = s.used
     if not rises_above(p, s, w, best):
         return best
     for n in range(ORDER - 1):
@@ -124,28 +134,40 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
     w.other[ORDER - 1], w.other[ORDER] = 0.0, 0.0
     if abs(w.other[0]) + lower_bound(w.other, math.copysign(1.0, w.other[0])) > 0.0:
         return best  # the force only rises or only falls
-    low, width = 0.0, used
+    low, width, halved, used = 0.0, s.used, False, s.used
+    bernstein_over(w, low, used)
     while low < used:
-        high = min(low + width, used)
-        changes = changes_between(w.other, w.bernstein, low, high)
+        high, changes = min(low + width, used), sign_changes(w.bernstein)
         if changes > 1 and width > _NARROWEST:
-            width *= 0.5
+            w.work += 1
+            halve(w)
+            width, halved = 0.5 * width, True
             continue
         if changes > 0 or high < used:
-            top = bracketed_root(w.other, w.bernstein, low, high) if changes == 1 else high
+            top = bracketed_root(w, low, high) if changes == 1 else high
             best = max(best, force_on_hand(p, s.heading, value_at(w.x, top), value_at(w.i, top)))
-        low, width = high, 2.0 * width
+        width = next_piece(w, high, used, width, halved)
+        low, halved = high, False
     return best
 
 
 def rises_above(p: Constants, s: ShotState, w: StepSeries, best: float) -> bool:
-    """Whether the force may rise above `best` within the step, by the bound of its series, m (n + 1) v[n + 1]/span."""
+    """Whether the force may rise above `best` within the step, by two bounds of its series, m (n + 1) v[n + 1]/span."""
     even, odd = w.v[1], 0.0
     for n in range(2, ORDER, 2):
         even += n * max(w.v[n], 0.0)
         odd += (n + 1) * max(w.v[n + 1], 0.0)
-    high = even + odd + ORDER * max(w.v[ORDER], 0.0)
-    return high * p.mass / s.span > best + _EQUAL * abs(best)
+    high, least = even + odd + ORDER * max(w.v[ORDER], 0.0), (best + _EQUAL * abs(best)) * s.span / p.mass
+    if not high > least:
+        return False
+    for n in range(ORDER):
+        w.other[n] = (n + 1) * w.v[n + 1]
+    w.other[ORDER] = 0.0
+    bernstein_over(w, 0.0, s.used)
+    high = w.bernstein[0]
+    for n in range(1, ORDER + 1):
+        high = max(high, w.bernstein[n])
+    return high > least
 
 
 def coast(p: Constants, s: ShotState, out: ShotResult) -> int:
@@ -194,7 +216,7 @@ class ShotSummary:
     the magnet never broke away.
 
     Status: `home`; `no-break-away`; `stuck` (friction holds the magnet off its stop); `not-home` (still moving or
-    held by the coil after 10 s, or beyond what floats can express).
+    held by the coil after 10 s, more work than `MAX_WORK`, or beyond what floats can express).
     """
 
     status: Status

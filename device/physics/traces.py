@@ -25,6 +25,7 @@ from device.physics.equations import (
     FREE,
     GIVEN_UP,
     MAX_SEGMENTS,
+    MAX_WORK,
     SETTLED,
     STOP,
     Coefficients,
@@ -114,7 +115,8 @@ def segments(constants: Constants) -> Iterator[Segment]:
         began = s.kind, s.heading, s.u, s.live, s.time, (s.x, s.v, s.i)
         event = advance(constants, s, w)
         yield _segment(constants, began, s, w, event)
-        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until):
+        w.work += 1
+        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until) or w.work > MAX_WORK:
             return
         if event == DRIVE_CHANGE:
             pulse_off(constants, s)
