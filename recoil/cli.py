@@ -32,6 +32,7 @@ COMMANDS = (
     sessions.run,
     sessions.study,
     sessions.watch,
+    sessions.markers,
     sessions.freeze,
     sessions.rebuild,
     numbers.analyze,

@@ -46,6 +46,22 @@ def run_session(request: RunRequest) -> Place:
         raise KeyboardInterrupt from stop
 
 
+@contextmanager
+def markers(request: RunRequest, *, wanted: bool) -> Iterator[None]:
+    """Have what happens in the run sent to Lab Streaming Layer meanwhile, if that is wanted. Never an error."""
+    if not wanted:
+        yield
+        return
+    from experiments.watch.markers_process import markers_beside  # noqa: PLC0415 - most runs need none of it
+
+    def say(text: str) -> None:
+        with suppress(OSError):  # where the terminal is gone, nobody reads it
+            sys.stderr.write(f"recoil: {text}\n")
+
+    with markers_beside(request.results, say):
+        yield
+
+
 def _say_beforehand(request: RunRequest) -> None:
     """Whose journals cannot be read, and what is not as it was frozen: no reason to send this participant home."""
     setup, results = request.setup, request.results

@@ -58,6 +58,9 @@ NoiseOption = Annotated[
 MonitorOption = Annotated[
     int | None, typer.Option(min=0, help="The participant's screen: 0 is the first; without: the last of several.")
 ]
+LslOption = Annotated[
+    bool, typer.Option("--lsl", help="Each shot, answer, pause and fault to Lab Streaming Layer (`recoil markers`).")
+]
 
 
 def run(
@@ -76,6 +79,7 @@ def run(
     participant_keys: OwnKeysOption = False,
     noise: NoiseOption = False,
     participant_monitor: MonitorOption = None,
+    lsl: LslOption = False,
     as_json: AsJsonOption = False,
 ) -> None:
     """One run: a participant doing one experiment."""
@@ -98,10 +102,11 @@ def run(
             screen=participant_screen, keys=participant_keys, noise=noise, monitor=participant_monitor
         ),
     )
-    if participant is None:
-        session.run_lab_day(request)
-        return
-    done = session.run_session(request)
+    with session.markers(request, wanted=lsl):
+        if participant is None:
+            session.run_lab_day(request)
+            return
+        done = session.run_session(request)
     show({"journal": str(done.journal), "table": str(done.table)}, f"Done: {done.table}", as_json)
 
 
@@ -141,6 +146,26 @@ def watch(
         sys.stdout.flush()
 
     feature.serve_page(results, port, tell)
+
+
+def markers(
+    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A results folder, or a study's folder.")],
+    as_json: AsJsonOption = False,
+) -> None:
+    """What happens in runs, sent to Lab Streaming Layer from now on, until interrupted: prints the streams' names."""
+    import threading
+
+    from experiments.watch import lsl as feature
+    from experiments.watch.folder import watched_folder
+
+    def tell(made: feature.MarkerStreams) -> None:
+        if made.problem:
+            say(f"recoil: {made.problem}")
+        names = " and ".join(f"“{name}”" for name in made.streams)
+        show(made, f"Streams {names} ({made.source}), of runs in {made.folder}\nCtrl+C ends them.", as_json)
+        sys.stdout.flush()
+
+    feature.send_markers(watched_folder(results), tell, lambda text: say(f"recoil: {text}"), threading.Event())
 
 
 def freeze(

@@ -1,0 +1,177 @@
+"""Markers on the network as streams of Lab Streaming Layer, from a process of its own: no run ever waits for it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from device.words import RecoilError
+from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
+from experiments.watch.feed import MarkerFeed
+from experiments.watch.markers import DETAILS, Marker
+from experiments.watch.server import NICE
+
+if TYPE_CHECKING:
+    from pylsl import StreamInfo
+
+NAME, DETAILS_NAME = "Recoil", "Recoil details"
+LOOK_S = 0.02
+"""How long after a look the next one comes: so late at the least is a marker sent, with the time of its event."""
+CLOCK_S = 1.0
+"""How often the two clocks are read beside each other."""
+READINGS = 20
+"""Readings of which the quickest counts."""
+FOUND_S = 2.0
+"""How long it is looked for our own streams; on a network that works they are there within a few milliseconds."""
+LINGER_S = 0.5
+"""So long the streams stay for those who still read."""
+INSTALL = (
+    "install the extra `lsl` (`make setup` in Recoil's folder does; without make: docs/install.md); on a system for "
+    "which pylsl brings no library, install liblsl too"
+)
+
+
+class NoStreams(RecoilError):  # noqa: N818 - what is not there
+    """There can be no streams here; the message says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkerStreams:
+    """What a recorder finds: two streams, by their names and their source."""
+
+    folder: Path
+    streams: tuple[str, ...]
+    source: str
+    problem: str = ""
+
+
+def source_of(folder: Path) -> str:
+    """What tells the streams of a folder's runs from others', and is the same after a new start.
+
+    A recorder that lost them finds them again by it.
+    """
+    return "recoil-" + hashlib.sha256(f"{platform.node()}\0{folder.absolute()}".encode()).hexdigest()[:16]
+
+
+class Streams:
+    """Two outlets of the same events: a marker in one channel for every program, and its details by column.
+
+    `NoStreams`: there is no library, or it makes no streams.
+    """
+
+    def __init__(self, source: str) -> None:
+        try:
+            import pylsl  # noqa: PLC0415 - an extra, used here alone
+        except (ImportError, OSError, RuntimeError) as error:  # no package, or a package without its library
+            raise NoStreams(f"no Lab Streaming Layer here ({' '.join(str(error).split())}): {INSTALL}") from error
+        self._lsl, self._source = pylsl, source
+        try:
+            self._outlets = [
+                pylsl.StreamOutlet(self._info(NAME, "Markers", ("marker",))),
+                pylsl.StreamOutlet(self._info(DETAILS_NAME, "Details", DETAILS)),
+            ]
+        except RuntimeError as error:
+            raise NoStreams(f"Lab Streaming Layer makes no stream ({error}): look at this machine's network") from error
+        self._clock, self._next_s = self._mapped(), 0.0
+
+    def _info(self, name: str, kind: str, columns: Sequence[str]) -> StreamInfo:
+        lsl = self._lsl
+        source = f"{self._source}-{kind.lower()}"
+        info = lsl.StreamInfo(name, kind, len(columns), lsl.IRREGULAR_RATE, "string", source)
+        channels = info.desc().append_child("channels")
+        for column in columns:
+            channels.append_child("channel").append_child_value("label", column)
+        return info
+
+    def found(self) -> bool:
+        """Whether the streams are found by who looks for them on the network."""
+        predicate = f"starts-with(source_id,'{self._source}')"
+        return len(self._lsl.resolve_bypred(predicate, len(self._outlets), FOUND_S)) == len(self._outlets)
+
+    def send(self, marker: Marker) -> None:
+        """Send a marker with its time on the clock of the streams, whose own uncertainty is added. Never waits."""
+        there = self._clock_now()
+        told = replace(marker, uncertainty_s=marker.uncertainty_s + there.uncertainty_s)
+        at_s = there.there(marker.at_s)
+        for outlet, sample in zip(self._outlets, ((told.name,), told.details), strict=True):
+            outlet.push_sample(sample, at_s)
+
+    def close(self) -> None:
+        """Let go of the streams, when those who read had their time."""
+        if any(outlet.have_consumers() for outlet in self._outlets):
+            time.sleep(LINGER_S)
+        self._outlets.clear()
+
+    def _clock_now(self) -> ClockMap:
+        now_s = time.monotonic()
+        if now_s >= self._next_s:
+            before, new = self._clock, self._mapped()
+            self._clock = replace(new, uncertainty_s=new.uncertainty_s + abs(new.offset_s - before.offset_s))
+            self._next_s = now_s + CLOCK_S
+        return self._clock
+
+    def _mapped(self) -> ClockMap:
+        """The clock of the streams beside that of the journals, which are the same on some systems."""
+        read, there = time.monotonic, self._lsl.local_clock
+        return clock_map(RoundTrip(sent_s=read(), there_s=there(), back_s=read()) for _ in range(READINGS))
+
+
+@contextmanager
+def quiet_library() -> Iterator[None]:
+    """What the library itself writes to standard error is not seen meanwhile; what we say is."""
+    said, sys_stderr = os.dup(2), sys.stderr
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    sys.stderr = os.fdopen(said, "w", encoding="utf-8", buffering=1, closefd=False)
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # nobody reads it any more
+            sys.stderr.flush()
+        sys.stderr = sys_stderr
+        os.dup2(said, 2)
+        os.close(said)
+
+
+def send_markers(
+    folder: Path, tell: Callable[[MarkerStreams], None], say: Callable[[str], None], over: threading.Event
+) -> None:
+    """Send the markers of a results folder's runs until it is over. `tell` is called once the streams are there.
+
+    `NoStreams`: there can be none.
+    """
+    if hasattr(os, "nice"):
+        os.nice(NICE)
+    with quiet_library():
+        streams = Streams(source_of(folder))
+        try:
+            feed = MarkerFeed(folder, say)
+            problem = "" if streams.found() else NOT_FOUND
+            tell(MarkerStreams(folder=folder, streams=(NAME, DETAILS_NAME), source=source_of(folder), problem=problem))
+            while not over.wait(LOOK_S):
+                _send(streams, feed)
+            feed.find()
+            _send(streams, feed)
+        finally:
+            streams.close()
+
+
+NOT_FOUND = (
+    "the streams are not found on this machine's own network; a recorder may not find them either: look at network and "
+    "firewall (multicast, ports 16571 to 16604)"
+)
+
+
+def _send(streams: Streams, feed: MarkerFeed) -> None:
+    for marker in feed.look():
+        streams.send(marker)

@@ -1,0 +1,120 @@
+"""Markers beside a run: a process of its own that begins before the run and ends with it, however that ends."""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
+
+READY_S = 20.0
+"""How long a run waits for the streams before it begins."""
+END_S = 5.0
+"""How long the streams have for what is still to be sent, and again to end when they are told to."""
+_ROOT = Path(__file__).parents[2]
+_READY = "ready"
+
+
+@contextmanager
+def markers_beside(results: Path, say: Callable[[str], None]) -> Iterator[None]:
+    """Have the runs of a results folder sent meanwhile. Whatever is in the way is said once, and nothing else."""
+    command = [sys.executable, "-m", __name__, str(results.absolute())]
+    try:
+        child = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            cwd=_ROOT,
+            start_new_session=True,  # Ctrl+C is for the run
+        )
+    except OSError as error:
+        say(f"no markers: {error}")
+        yield
+        return
+    lines = _lines(child)
+    _wait_ready(lines, say)
+    try:
+        yield
+    finally:
+        _end(child, say)
+
+
+def _lines(child: subprocess.Popen[str]) -> queue.SimpleQueue[str]:
+    """What a child says, line by line; empty at its end."""
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def read(pipe: IO[str]) -> None:
+        with pipe:
+            for line in pipe:
+                lines.put(line.rstrip("\n"))
+        lines.put("")
+
+    threading.Thread(target=read, args=(child.stdout,), daemon=True, name="markers").start()
+    return lines
+
+
+def _wait_ready(lines: queue.SimpleQueue[str], say: Callable[[str], None]) -> None:
+    try:
+        said = lines.get(timeout=READY_S)
+    except queue.Empty:
+        say(f"no markers yet: their streams are not there after {READY_S:g} s; the run begins without them")
+        return
+    if said != _READY:
+        say(said or "no markers: their process ended at once")
+
+
+def _end(child: subprocess.Popen[str], say: Callable[[str], None]) -> None:
+    """Let the child send the rest and end. One that ended before the run did says why; its exit code is 0 or 2."""
+    if child.poll() not in (None, 0, 2):
+        say(f"markers: their process ended before the run (exit code {child.returncode}); its journal is whole")
+    with suppress(OSError):
+        assert child.stdin is not None  # noqa: S101 - a pipe
+        child.stdin.close()
+    for insist in (child.poll, child.terminate, child.kill):
+        insist()
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(END_S)
+            break
+
+
+def _until_left(over: threading.Event) -> None:
+    """Wait for the end of standard input: the run is over, or was killed."""
+    while os.read(0, 1024):  # not `sys.stdin`, whose lock the end of the program would wait for
+        pass
+    over.set()
+
+
+def main() -> int:
+    """Send the markers of the folder that is named, until whoever started this is gone."""
+    os.umask(0o077)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    over = threading.Event()
+    threading.Thread(target=_until_left, args=(over,), daemon=True).start()
+
+    def tell(made: MarkerStreams) -> None:
+        print(f"markers: {made.problem}" if made.problem else _READY, flush=True)  # noqa: T201 - to the run
+
+    def say(text: str) -> None:
+        with suppress(OSError):  # where the terminal is gone, nobody reads it
+            sys.stderr.write(f"recoil: markers: {text}\n")
+
+    try:
+        send_markers(Path(sys.argv[1]), tell, say, over)
+    except NoStreams as error:
+        print(f"no markers: {error}", flush=True)  # noqa: T201 - to the run
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
