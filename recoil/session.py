@@ -47,7 +47,7 @@ def run_session(request: RunRequest) -> Place:
 
 
 @contextmanager
-def markers(request: RunRequest, *, wanted: bool) -> Iterator[None]:
+def with_markers(request: RunRequest, *, wanted: bool) -> Iterator[None]:
     """Have what happens in the run sent to Lab Streaming Layer meanwhile, if that is wanted. Never an error."""
     if not wanted:
         yield

@@ -50,6 +50,7 @@ from experiments.doctor.figures import (
     GunLine,
     Keys,
     Machine,
+    MarkerStream,
     Percentiles,
     PsychoPyStage,
     Sound,
@@ -191,6 +192,7 @@ def test_latencies_of_several_journals_are_counted_together() -> None:
 
 # verdicts
 
+STREAMS = MarkerStream(version="1.18", sent=2, to_reader_ms=[0.1, 0.2])
 MACHINE = Machine(system="Linux", python="3.11.7", cores=2, versions={"numpy": "2.4", "psychopy": "2026.2.5"})
 TICKS = Ticks(resolution_s=1e-9, smallest_step_s=4e-8, oversleep_ms=FAST)
 DISK = Appends(append_ms=FAST, free_bytes=10**10)
@@ -241,6 +243,10 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_keys(replace(KEYS, injected=30)), "warning", "some keys went elsewhere"),
         (verdicts.of_keys(replace(KEYS, to_event_ms=[0.4, 40.0])), "warning", "more than 10 ms"),
         (verdicts.of_keys(Keys(injected=30, to_event_ms=[], to_painted_ms=[])), "warning", "in front"),
+        (verdicts.of_streams(STREAMS), "good", ""),
+        (verdicts.of_streams(replace(STREAMS, to_reader_ms=[0.1])), "warning", "multicast"),
+        (verdicts.of_streams(replace(STREAMS, sent=0, to_reader_ms=[])), "warning", "multicast"),
+        (verdicts.no_streams("pylsl is not installed"), "not there", "the extra `lsl`"),
         (verdicts.of_absent("display", "neither is set"), "not there", "DISPLAY"),
         (verdicts.of_absent("PsychoPy", "psychopy is not installed"), "not there", "make full"),
         (verdicts.of_failure("display", "was killed by signal 6"), "fails", "libxcb-icccm4"),
@@ -426,6 +432,7 @@ def test_without_a_display_the_rest_is_looked_at_and_nothing_fails(recoil: Recoi
     assert {name for name, row in found.items() if row["verdict"] == "fails"} == set()
     for name in ("display", "PsychoPy", "keyboard", "step to screen", "key to disk"):
         assert found[name]["verdict"] == "not there"
+    assert len(found["streams"]["figures"]["to_reader_ms"]) == found["streams"]["figures"]["sent"] > 0
     assert found["disk"]["figures"]["append_ms"]["n"] > 0
     assert found["gun"]["figures"]["state"] == "disarmed"
     assert found["gun"]["figures"]["round_trip_ms"]["n"] == 200

@@ -188,6 +188,7 @@ def checks(results: Path, gun: str, limit_s: float, shots: int = 0) -> tuple[Che
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
         "sound": _sound,
         "keyboard": partial(_on_display, "keyboard", "keys"),
+        "streams": _streams,
         "console": partial(_console, results),
     }
     return tuple(Check(name=name, look=look) for name, look in looks.items())
@@ -256,6 +257,13 @@ def _sound() -> tuple[DoctorFinding, ...]:
     answer = ask("sound", DEADLINE_S)
     seen = answer.figures
     return (verdicts.no_sound(answer.absent or answer.error) if seen is None else verdicts.of_seen(seen),)
+
+
+def _streams() -> tuple[DoctorFinding, ...]:
+    answer = ask("streams", DEADLINE_S)
+    if answer.figures is None:
+        return (verdicts.no_streams(answer.absent) if answer.absent else verdicts.of_failure("streams", answer.error),)
+    return (verdicts.of_seen(answer.figures),)
 
 
 def _console(results: Path) -> tuple[DoctorFinding, ...]:

@@ -130,6 +130,18 @@ class Keys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MarkerStream:
+    """Markers through a stream of Lab Streaming Layer: how many were sent, and how long those took that came.
+
+    None were sent if nobody on this machine found the stream.
+    """
+
+    version: str
+    sent: int
+    to_reader_ms: list[float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Adapters:
     """The USB serial adapters that have a latency timer."""
 
@@ -150,7 +162,7 @@ class NoFigures:
     """Nothing was measured."""
 
 
-ProgramFigures = Display | PsychoPyStage | Sound | Keys
+ProgramFigures = Display | PsychoPyStage | Sound | Keys | MarkerStream
 """What a program of its own looks at."""
 Figures = Machine | Ticks | Appends | GunLine | Adapters | ProgramFigures | ConsoleLatency | NoFigures
 

@@ -215,6 +215,8 @@ def of_seen(found: figures.ProgramFigures) -> figures.DoctorFinding:
             return of_sound(found)
         case figures.Keys():
             return of_keys(found)
+        case figures.MarkerStream():
+            return of_streams(found)
 
 
 def of_display(found: figures.Display) -> figures.DoctorFinding:
@@ -273,6 +275,27 @@ def of_keys(found: figures.Keys) -> figures.DoctorFinding:
     if event.p99 > MAX_KEY_MS:
         advice = f"keys take more than {MAX_KEY_MS:g} ms: close other programs and desktop effects"
     return _judged("keyboard", measured, advice, found)
+
+
+def of_streams(found: figures.MarkerStream) -> figures.DoctorFinding:
+    """Markers through Lab Streaming Layer."""
+    name = f"Lab Streaming Layer {found.version}"
+    came = len(found.to_reader_ms)
+    if came == 0 or came < found.sent:
+        lost = f"{came} of {found.sent} markers came back" if found.sent else "a stream was not found on this machine"
+        advice = (
+            "runs go on without it; for markers look at network and firewall (multicast, ports 16571 to 16604), or at "
+            "the library's lsl_api.cfg"
+        )
+        return _judged("streams", f"{name}; {lost}", advice, found)
+    took = figures.spread(found.to_reader_ms)
+    return _judged("streams", f"{name}; {came} markers came back, {_short(took)}", "", found)
+
+
+def no_streams(reason: str) -> figures.DoctorFinding:
+    """A machine without Lab Streaming Layer."""
+    advice = "only `recoil markers` and `recoil run --lsl` need it: the extra `lsl` (docs/howto/markers.md)"
+    return figures.DoctorFinding(check="streams", verdict="not there", measured=reason, advice=advice)
 
 
 def of_latencies(found: Latencies) -> tuple[figures.DoctorFinding, figures.DoctorFinding]:

@@ -1,1 +1,1 @@
-"""The read-only page about runs in progress."""
+"""Who follows runs in progress by their journals: the read-only page, and the markers for other recordings."""

@@ -13,11 +13,11 @@ from experiments.watch.folder import journals_in
 from experiments.watch.markers import Marker, RunMarkers
 from experiments.watch.runs import age_s
 
-FIND_S = 0.2
+_FIND_S = 0.2
 """How often it is looked for journals that have begun or go on."""
-SHARE = 10
+_SHARE = 10
 """A search that takes long is followed by a rest so many times as long: folders can hold thousands of journals."""
-STRANGE_S = 5.0
+_STRANGE_S = 5.0
 """A record that is younger or older by its clock than by its date by so much was written by another clock (assumed)."""
 _Say = Callable[[str], None]
 _Stamp = tuple[int, int]
@@ -55,7 +55,7 @@ class MarkerFeed:
             if path not in self._runs and stamp != before and self._ended.get(path) != stamp[0]:
                 self._runs[path] = FollowedRun(path, _lines_before(path, before, stamp), self._say)
         now_s = time.monotonic()
-        self._next_s = now_s + max(FIND_S, SHARE * (now_s - began_s))
+        self._next_s = now_s + max(_FIND_S, _SHARE * (now_s - began_s))
 
     def _journals(self) -> Iterator[tuple[Path, _Stamp]]:
         try:
@@ -131,7 +131,7 @@ class FollowedRun:
         clock = self._clock or "real"
         if clock != "real":
             why = f"this run is on a clock of its own ({clock}), which no other recording has"
-        elif abs(now_s - first.monotonic_s - age_s(first.utc, utc)) > STRANGE_S:
+        elif abs(now_s - first.monotonic_s - age_s(first.utc, utc)) > _STRANGE_S:
             why = f"record {first.n} was written at another machine, or its date was set just then"
         else:
             return False

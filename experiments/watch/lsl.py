@@ -17,24 +17,24 @@ from typing import TYPE_CHECKING
 from device.words import RecoilError
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.watch.feed import MarkerFeed
-from experiments.watch.markers import DETAILS, Marker
+from experiments.watch.markers import DETAIL_COLUMNS, Marker
 from experiments.watch.server import NICE
 
 if TYPE_CHECKING:
     from pylsl import StreamInfo
 
 NAME, DETAILS_NAME = "Recoil", "Recoil details"
-LOOK_S = 0.02
+_LOOK_S = 0.02
 """How long after a look the next one comes: so late at the least is a marker sent, with the time of its event."""
 CLOCK_S = 1.0
 """How often the two clocks are read beside each other."""
-READINGS = 20
+_READINGS = 20
 """Readings of which the quickest counts."""
 FOUND_S = 2.0
 """How long it is looked for our own streams; on a network that works they are there within a few milliseconds."""
 LINGER_S = 0.5
 """So long the streams stay for those who still read."""
-INSTALL = (
+_INSTALL = (
     "install the extra `lsl` (`make setup` in Recoil's folder does; without make: docs/install.md); on a system for "
     "which pylsl brings no library, install liblsl too"
 )
@@ -62,7 +62,7 @@ def source_of(folder: Path) -> str:
     return "recoil-" + hashlib.sha256(f"{platform.node()}\0{folder.absolute()}".encode()).hexdigest()[:16]
 
 
-class Streams:
+class MarkerOutlets:
     """Two outlets of the same events: a marker in one channel for every program, and its details by column.
 
     `NoStreams`: there is no library, or it makes no streams.
@@ -72,12 +72,12 @@ class Streams:
         try:
             import pylsl  # noqa: PLC0415 - an extra, used here alone
         except (ImportError, OSError, RuntimeError) as error:  # no package, or a package without its library
-            raise NoStreams(f"no Lab Streaming Layer here ({' '.join(str(error).split())}): {INSTALL}") from error
+            raise NoStreams(f"no Lab Streaming Layer here ({' '.join(str(error).split())}): {_INSTALL}") from error
         self._lsl, self._source = pylsl, source
         try:
             self._outlets = [
                 pylsl.StreamOutlet(self._info(NAME, "Markers", ("marker",))),
-                pylsl.StreamOutlet(self._info(DETAILS_NAME, "Details", DETAILS)),
+                pylsl.StreamOutlet(self._info(DETAILS_NAME, "Details", DETAIL_COLUMNS)),
             ]
         except RuntimeError as error:
             raise NoStreams(f"Lab Streaming Layer makes no stream ({error}): look at this machine's network") from error
@@ -122,7 +122,7 @@ class Streams:
     def _mapped(self) -> ClockMap:
         """The clock of the streams beside that of the journals, which are the same on some systems."""
         read, there = time.monotonic, self._lsl.local_clock
-        return clock_map(RoundTrip(sent_s=read(), there_s=there(), back_s=read()) for _ in range(READINGS))
+        return clock_map(RoundTrip(sent_s=read(), there_s=there(), back_s=read()) for _ in range(_READINGS))
 
 
 @contextmanager
@@ -153,12 +153,12 @@ def send_markers(
     if hasattr(os, "nice"):
         os.nice(NICE)
     with quiet_library():
-        streams = Streams(source_of(folder))
+        streams = MarkerOutlets(source_of(folder))
         try:
             feed = MarkerFeed(folder, say)
-            problem = "" if streams.found() else NOT_FOUND
+            problem = "" if streams.found() else _NOT_FOUND
             tell(MarkerStreams(folder=folder, streams=(NAME, DETAILS_NAME), source=source_of(folder), problem=problem))
-            while not over.wait(LOOK_S):
+            while not over.wait(_LOOK_S):
                 _send(streams, feed)
             feed.find()
             _send(streams, feed)
@@ -166,12 +166,12 @@ def send_markers(
             streams.close()
 
 
-NOT_FOUND = (
+_NOT_FOUND = (
     "the streams are not found on this machine's own network; a recorder may not find them either: look at network and "
     "firewall (multicast, ports 16571 to 16604)"
 )
 
 
-def _send(streams: Streams, feed: MarkerFeed) -> None:
+def _send(streams: MarkerOutlets, feed: MarkerFeed) -> None:
     for marker in feed.look():
         streams.send(marker)

@@ -54,12 +54,12 @@ class Marker:
 
     @property
     def details(self) -> tuple[str, ...]:
-        """All of it but its time, as `DETAILS` names it; empty is what there is not."""
+        """All of it but its time, as `DETAIL_COLUMNS` names it; empty is what there is not."""
         return tuple(_text(value) for name, value in zip(_FIELDS, astuple(self), strict=True) if name != "at_s")
 
 
 _FIELDS = tuple(field.name for field in fields(Marker))
-DETAILS = tuple(name for name in _FIELDS if name != "at_s")
+DETAIL_COLUMNS = tuple(name for name in _FIELDS if name != "at_s")
 
 
 def _text(value: object) -> str:
@@ -71,10 +71,10 @@ def _text(value: object) -> str:
     return "" if value is None else str(int(value)) if isinstance(value, bool) else str(value)
 
 
-def levels_text(name: str, levels: Condition) -> str:
+def tagged(name: str, levels: Condition) -> str:
     """A marker's name with levels, in the form whose parts MNE selects by.
 
-    >>> levels_text("shot", (("method", "vibration"), ("voltage_V", 12.5)))
+    >>> tagged("shot", (("method", "vibration"), ("voltage_V", 12.5)))
     'shot/method=vibration/voltage_V=12.5'
     """
     return "/".join([name, *(f"{factor}={level}" for factor, level in levels)])
@@ -185,7 +185,7 @@ class RunMarkers:
         match self._step:
             case steps.FireShot() | steps.Present() as step:
                 felt = step.trial.with_chosen(step.chosen).levels_at(getattr(step, "interval", 0))
-                return "no-shot" if felt is None else levels_text("shot", felt)
+                return "no-shot" if felt is None else tagged("shot", felt)
             case _:
                 return "shot"
 
@@ -193,7 +193,7 @@ class RunMarkers:
         at_s = shot.pulse_start_s
         if at_s is None:
             return replace(self._of_trial(), name="fault", value=shot.cause)
-        name, within_s = levels_text("test-shot", (("method", shot.method),)), max(0.0, record.monotonic_s - at_s)
+        name, within_s = tagged("test-shot", (("method", shot.method),)), max(0.0, record.monotonic_s - at_s)
         return replace(self._blank, name=name, at_s=at_s, time_from="gun", uncertainty_s=within_s)
 
     def _answer(self, asked: steps.Asking, answer: steps.Answered) -> Marker:

@@ -17,7 +17,7 @@ from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
 
 READY_S = 20.0
 """How long a run waits for the streams before it begins."""
-END_S = 5.0
+_END_S = 5.0
 """How long the streams have for what is still to be sent, and again to end when they are told to."""
 _ROOT = Path(__file__).parents[2]
 _READY = "ready"
@@ -83,7 +83,7 @@ def _end(child: subprocess.Popen[str], say: Callable[[str], None]) -> None:
     for insist in (child.poll, child.terminate, child.kill):
         insist()
         with suppress(subprocess.TimeoutExpired):
-            child.wait(END_S)
+            child.wait(_END_S)
             break
 
 
@@ -94,7 +94,7 @@ def _until_left(over: threading.Event) -> None:
     over.set()
 
 
-def main() -> int:
+def send_beside() -> int:
     """Send the markers of the folder that is named, until whoever started this is gone."""
     os.umask(0o077)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -117,4 +117,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(send_beside())

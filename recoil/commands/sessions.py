@@ -102,7 +102,7 @@ def run(
             screen=participant_screen, keys=participant_keys, noise=noise, monitor=participant_monitor
         ),
     )
-    with session.markers(request, wanted=lsl):
+    with session.with_markers(request, wanted=lsl):
         if participant is None:
             session.run_lab_day(request)
             return

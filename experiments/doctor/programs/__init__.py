@@ -1,7 +1,7 @@
 """Programs that look at what could crash or hang: each runs in a process of its own and answers with one JSON object.
 
-Whatever the libraries that it imports print or raise does not spoil the answer. Only here are Qt, PsychoPy, sound and X
-libraries imported.
+Whatever the libraries that it imports print or raise does not spoil the answer. Only here are Qt, PsychoPy, Lab
+Streaming Layer, sound and X libraries imported.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from experiments.doctor.figures import ProgramFigures
 
-OPTIONAL = ("PyQt6", "Xlib", "psychopy", "sounddevice")
+OPTIONAL = ("PyQt6", "Xlib", "psychopy", "pylsl", "sounddevice")
 
 
 class Absent(Exception):  # noqa: N818 - that something is not there is no error

@@ -1,0 +1,36 @@
+"""Is Lab Streaming Layer there, and do markers come back on this machine's own network?"""
+
+from __future__ import annotations
+
+import time
+from uuid import uuid4
+
+from experiments.doctor.figures import MarkerStream
+from experiments.doctor.programs import Absent
+
+_MARKERS = 50
+_SECONDS = 3.0
+"""How long anything is waited for."""
+
+
+def look() -> MarkerStream:
+    """Make a stream, find it as a recorder would, and send markers through it."""
+    try:
+        import pylsl  # noqa: PLC0415 - an extra; raises where it finds no library
+    except RuntimeError as error:
+        raise Absent(f"pylsl finds no library of Lab Streaming Layer: {' '.join(str(error).split())}") from error
+    source, version = f"recoil-doctor-{uuid4().hex}", f"{pylsl.library_version() / 100:.2f}"
+    outlet = pylsl.StreamOutlet(pylsl.StreamInfo("Recoil doctor", "Markers", 1, pylsl.IRREGULAR_RATE, "string", source))
+    found = pylsl.resolve_byprop("source_id", source, 1, _SECONDS)
+    if not found:
+        return MarkerStream(version=version, sent=0, to_reader_ms=[])
+    inlet = pylsl.StreamInlet(found[0])
+    inlet.open_stream(_SECONDS)
+    took_ms = list[float]()
+    for number in range(_MARKERS):
+        sent_s = time.monotonic()
+        outlet.push_sample([str(number)], pylsl.local_clock())
+        if inlet.pull_sample(_SECONDS)[0] != [str(number)]:
+            break
+        took_ms.append(1000 * (time.monotonic() - sent_s))
+    return MarkerStream(version=version, sent=_MARKERS, to_reader_ms=took_ms)
