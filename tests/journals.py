@@ -1,15 +1,16 @@
-"""Journals as they stand on the disk: their lines, unchecked."""
+"""Journals as they stand on the disk: their lines, unchecked; and how soon answers were there."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from experiments.config.setup import canonical_json, sha256
 from experiments.design.plan import Plan
-from experiments.record.journal import link_of
+from experiments.record.journal import Record, link_of
 
 
 def raw(path: Path) -> list[dict[str, Any]]:
@@ -33,3 +34,16 @@ def forged(entries: Sequence[dict[str, Any]]) -> bytes:
         before = link_of(lines[-1]) if lines else ""
         lines.append(canonical_json(entry | {"n": n, "link": before}) + b"\n")
     return b"".join(lines)
+
+
+def key_to_disk_ms(records: tuple[Record, ...]) -> list[float]:
+    """From the key of each answer to its record on the disk, in order of the trials."""
+    found, pulse_s = [], 0.0
+    for record, following in pairwise(records):
+        body = record.body if isinstance(record.body, dict) else {}
+        if body.get("kind") == "fired":
+            pulse_s = body["pulse_start_s"]
+        elif body.get("kind") == "answered":
+            assert following.synced_s is not None
+            found.append(1000 * (following.synced_s - pulse_s - body["response_time_s"]))
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 import pyxdf
 
 from experiments.watch.lsl import DETAILS_NAME, NAME
+from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S
 
 SCRIPT = """
@@ -40,6 +42,18 @@ def recording(xdf: Path, source: str) -> Iterator[None]:
             yield
         finally:
             recorder.communicate(timeout=PATIENCE_S)
+
+
+@contextmanager
+def markers_process(results: Path) -> Iterator[int]:
+    """`recoil markers` of a folder, whose streams are there; its process."""
+    command = [str(RECOIL), "markers", str(results), "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout.readline() == "{\n"
+        yield program.pid
+        program.send_signal(signal.SIGCONT)
+        program.send_signal(signal.SIGINT)
+        program.communicate(timeout=PATIENCE_S)
 
 
 def recorded(xdf: Path) -> tuple[list[tuple[float, str]], list[tuple[float, Row]]]:

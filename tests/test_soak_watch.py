@@ -13,16 +13,16 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments.record import storage
-from experiments.record.journal import Record, read_journal
+from experiments.record.journal import read_journal
 from tests.at_terminal import AtTerminal
 from tests.conftest import RECOIL, Soak
+from tests.journals import key_to_disk_ms
 from tests.kills import words
 from tests.waiting import wait_for
 
@@ -96,19 +96,6 @@ def test_a_record_is_on_the_page_within_half_a_second(quick_configs: Path, tmp_p
     how = f"{len(latencies_s)} times, a process each; median {statistics.median(latencies_s):.2f} s, worst {most:.2f} s"
     soak("99th percentile, record on the disk to the page of a viewer", f"{share:.2f} s", f"{UPDATE_S} s", how)
     assert share <= UPDATE_S
-
-
-def key_to_disk_ms(records: tuple[Record, ...]) -> list[float]:
-    """From the key of each answer to its record on the disk, in order of the trials."""
-    found, pulse_s = [], 0.0
-    for record, following in pairwise(records):
-        body = record.body if isinstance(record.body, dict) else {}
-        if body.get("kind") == "fired":
-            pulse_s = body["pulse_start_s"]
-        elif body.get("kind") == "answered":
-            assert following.synced_s is not None
-            found.append(1000 * (following.synced_s - pulse_s - body["response_time_s"]))
-    return found
 
 
 def test_twenty_viewers_cost_a_run_nothing_that_can_be_measured(

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from pylsl import StreamInfo
 
 NAME, DETAILS_NAME = "Recoil", "Recoil details"
-_LOOK_S = 0.02
-"""How long after a look the next one comes: so late at the least is a marker sent, with the time of its event."""
+_LOOK_S = 0.1
+"""How long after a look the next one comes. A marker has the time of its event, however late it is sent."""
 CLOCK_S = 1.0
 """How often the two clocks are read beside each other."""
 _READINGS = 20
@@ -48,7 +48,7 @@ class NoStreams(RecoilError):  # noqa: N818 - what is not there
 class MarkerStreams:
     """What a recorder finds: two streams, by their names and their source."""
 
-    folder: Path
+    folder: str
     streams: tuple[str, ...]
     source: str
     problem: str = ""
@@ -157,7 +157,8 @@ def send_markers(
         try:
             feed = MarkerFeed(folder, say)
             problem = "" if streams.found() else _NOT_FOUND
-            tell(MarkerStreams(folder=folder, streams=(NAME, DETAILS_NAME), source=source_of(folder), problem=problem))
+            names = (NAME, DETAILS_NAME)
+            tell(MarkerStreams(folder=str(folder), streams=names, source=source_of(folder), problem=problem))
             while not over.wait(_LOOK_S):
                 _send(streams, feed)
             feed.find()
