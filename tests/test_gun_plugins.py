@@ -19,9 +19,12 @@ from device.plugin.guard import GuardedGun, PluginError
 from device.simulated import SimulatedGun
 from experiments import run as runs
 from experiments.clock import RealClock
+from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.record.journal import read_journal
-from experiments.screens.synthetic import synthetic_screen
+from experiments.record.journal import Record, read_journal
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
+from experiments.session import events
+from experiments.session.states import EMERGENCY
 from tests.firmware import emulated
 from tests.gun_plugins import install, install_sound_card
 from tests.twins import a_shot, a_twin
@@ -346,3 +349,59 @@ def test_a_run_is_carried_out_on_a_plug_in(tmp_path: Path, sound_card: str) -> N
     journal = read_journal(finished.place.journal)
     assert journal.finished
     assert "sound-card:null" in finished.place.journal.read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("heeds", [True, False], ids=["disarms", "plays-on"])
+def test_the_stop_key_in_mid_pulse_of_a_plug_in_is_its_last_shot_until_a_test_shot(
+    heeds: bool, tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pressed while the third shot plays; a plug-in that plays on is disarmed by the guard all the same."""
+    import sound_card_gun
+
+    plays, screens = [], []
+    play = sound_card_gun.Null.play
+
+    def playing(self: Any, samples: Any, off: threading.Event) -> float:
+        plays.append(len(samples))
+        if len(plays) == 3:
+            assert screens[0].live.offer(events.EmergencyStop())
+        return play(self, samples, off if heeds else threading.Event())
+
+    def make_screen(*of_run: Any) -> SyntheticScreen:
+        screens.append(AtLive(*of_run))
+        return screens[-1].screen
+
+    monkeypatch.setattr(sound_card_gun.Null, "play", playing)
+    request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
+    with pytest.raises(RunStopped, match=EMERGENCY):
+        runs.run(request, make_screen, RealClock(50.0))
+    assert len(plays) == 3
+    (journal,) = tmp_path.glob("sub-P01/*_journal.jsonl")
+    kinds = [body_kind(record) for record in read_journal(journal).records]
+    assert kinds.count("train-shot") == 2
+    assert "train-shot" not in kinds[kinds.index("halted") :]
+
+    finished = runs.run(replace(request, again="resume"), make_screen, RealClock(50.0))
+    kinds = [body_kind(record) for record in read_journal(finished.place.journal).records]
+    after = kinds[kinds.index("halted") :]
+    assert after.index("test-shot") < after.index("train-shot")
+    assert len(plays) - 3 == after.count("test-shot") + after.count("train-shot")
+
+
+class AtLive:
+    """The synthetic participant's screen, and the live run that it was shown."""
+
+    def __init__(self, *of_run: Any) -> None:
+        self.screen = synthetic_screen(*of_run)
+        self.live: Any = None
+        self._begin = self.screen.begin
+        self.screen.begin = self._shown  # type: ignore[method-assign]
+
+    def _shown(self, live: Any) -> None:
+        self.live = live
+        self._begin(live)
+
+
+def body_kind(record: Record) -> str:
+    return str(record.body["kind"]) if isinstance(record.body, dict) else record.kind

@@ -15,6 +15,8 @@ from device.limits import DriveHistory
 from device.serial_gun.lines import Disconnected, SerialPort
 from device.serial_gun.link import KEEP_ALIVE_S, WATCHDOG_S, Link
 from device.twin.twin import BUSY_US
+from device.wire.errors import WireError, message
+from device.wire.records import Frame, encode
 from tests.forger import a_lying_pair
 from tests.twins import SLOW, Troubles, a_pair, a_shot, a_twin, disarmings_of, is_up, said
 from tests.waiting import PATIENCE_S, wait_for
@@ -64,6 +66,16 @@ def away(pair):
     """This machine does nothing for the gun until its watchdog has disarmed it."""
     with pair.gun.link.lock:
         wait_for(lambda: not pair.twin.core.strict)
+
+
+def test_late_answers_to_a_session_that_was_lost_do_not_end_the_greeting_of_the_next(tmp_path):
+    with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
+        write, late = forger.write, encode(Frame(number=1, body=f"ERR {message(WireError.NO_SESSION)}"), "gun")
+        forger.write = lambda data: write(late + data)
+        pair.gun.link.drop("to be greeted again")
+        wait_for(lambda: pair.gun.link.session == 2)
+        pair.ready()
+        assert pair.gun.fire(a_shot()).timing.gun_count == 1
 
 
 AWAY = r"the gun's watchdog disarmed it: this machine was away for \d{3,} ms, and the gun waits for 1500 ms"

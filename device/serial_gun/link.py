@@ -274,10 +274,10 @@ class Link:
             self._pending.end_all(Garbled("the gun understood no line"))
             return
         waiting = self._pending.take(frame.number)
+        if waiting is None:  # its deadline has passed, or it was written before the line was lost
+            return
         if frame.body == _NO_SESSION:
             raise lines.Forgotten(self._alone(waiting))
-        if waiting is None:  # its deadline has passed
-            return
         waiting.reply = lines.Reply(
             body=frame.body, written_s=waiting.written_s, received_s=received_s, session=self.session
         )
@@ -293,9 +293,9 @@ class Link:
         with self.lock:
             self._clocks.add(exchange)
 
-    def _alone(self, waiting: lines.Waiting | None) -> str:
+    def _alone(self, waiting: lines.Waiting) -> str:
         """How the gun came to hear nothing for its watchdog's time, as the first frame after it shows."""
-        watchdog_ms, gap_ms = 1000 * self.watchdog_s, 1000 * waiting.gap_s if waiting else 0.0
+        watchdog_ms, gap_ms = 1000 * self.watchdog_s, 1000 * waiting.gap_s
         if gap_ms > watchdog_ms / 2:
             return (
                 f"the gun's watchdog disarmed it: this machine was away for {gap_ms:.0f} ms, and the gun waits for "
