@@ -68,10 +68,13 @@ def away(pair):
         wait_for(lambda: not pair.twin.core.strict)
 
 
-def test_late_answers_to_a_session_that_was_lost_do_not_end_the_greeting_of_the_next(tmp_path):
+@pytest.mark.parametrize("late", ["lost session", "name"])
+def test_late_answers_from_before_a_greeting_do_not_end_it(late, tmp_path):
     with a_lying_pair(tmp_path, speed=1.0) as (pair, forger):
-        write, late = forger.write, encode(Frame(number=1, body=f"ERR {message(WireError.NO_SESSION)}"), "gun")
-        forger.write = lambda data: write(late + data)
+        lost = encode(Frame(number=1, body=f"ERR {message(WireError.NO_SESSION)}"), "gun")
+        answer = lost if late == "lost session" else f"{pair.gun.link.named.text()}\n".encode()
+        write = forger.write
+        forger.write = lambda data: write(answer + data)
         pair.gun.link.drop("to be greeted again")
         wait_for(lambda: pair.gun.link.session == 2)
         pair.ready()

@@ -23,7 +23,7 @@ from tests.waiting import wait_for
 
 pytestmark = pytest.mark.soak
 
-RUNS, TRIALS, BLOCK = 12, 60, 5
+RUNS, TRIALS, BLOCK = 6, 60, 5
 """Markers are sent and not sent in turn, so many trials at a time; a recorder takes them down all the while."""
 COST_MS = 1.0
 """The bound of issue 19 for what stands beside a session: its 99th percentile is unchanged within this."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
 from device.serial_gun.lines import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure
-from device.serial_gun.link import Link
+from device.serial_gun.link import PLAIN_NAME, Link
 from device.serial_gun.reports import MAX_UNCERTAINTY_S, ShotOrder, ShotRequest, asked, ready_s, report
 from device.serial_gun.triggering import TRIES, Arming, Triggering, ask_again, standing
 from device.wire.records import Named, Splitter, StatusRecord
@@ -279,7 +279,7 @@ def probe(port: str) -> Named | None:
         splitter, end_s = Splitter(), time.monotonic() + PROBE_S
         while time.monotonic() < end_s:
             for answer in splitter.feed(line.read()):
-                if answer and answer.startswith(b"Recoil,"):
+                if answer and answer.startswith(PLAIN_NAME):
                     return Named.parse(answer.decode("latin-1"))
     except LinkError:
         return None

@@ -28,6 +28,8 @@ FIRST_EXCHANGES = 8
 SILENT_S = 2.0
 """After so long without a word from the gun the line is closed and opened again."""
 _MAX_WATCHDOG_MS, _MIN_WATCHDOG_MS = 60_000, 100
+PLAIN_NAME = b"Recoil,"
+"""How a gun's name begins in its plain language."""
 _NO_SESSION = f"ERR {message(WireError.NO_SESSION)}"
 
 
@@ -265,6 +267,8 @@ class Link:
     def _take(self, line: bytes | None, received_s: float) -> None:
         if line is not None and line[:1] not in {b"<", b""}:
             self._plain = line
+            if line.startswith(PLAIN_NAME):  # of a question that was asked before the session, however late
+                return
         try:
             frame = decode(line or b"", "gun")
         except Garbled as error:
