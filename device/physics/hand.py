@@ -10,7 +10,7 @@ where the coil's time constant is below 20 us).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -49,6 +49,7 @@ class HeldShot:
     peak_hand_force_N: float  # of k_h X + c_h X', what the skin feels
     peak_kick_m: float  # largest way back of the enclosure
     max_displacement_m: float
+    turn_s: float | None  # where the magnet first turns back
     reset_end_s: float | None  # first landing after the pulse
     impact_speed_m_s: float | None  # of magnet and enclosure against each other
     residual_impulse_Ns: float  # momentum less the impulse of the hand: integration error
@@ -105,27 +106,79 @@ def simulate_held(gun: GunParameters, hand: HandMechanics | None = None, until_s
 
     `RuntimeError`: the integration did not get there, or not in 200 stretches.
     """
+    hand = hand or HandMechanics()
+    stretches = list(_stretches(gun, hand, until_s))
+    return _held(gun, hand, stretches)
+
+
+def held_acceleration(
+    gun: GunParameters, time_s: Vector, hand: HandMechanics | None = None, until_s: float = 0.4
+) -> Vector:
+    """The enclosure's acceleration X'' in m/s2 at times from the onset of the pulse, recoil positive.
+
+    0 before the onset and after `until_s`. A landing, an impulse m v, is drawn as half a sine over the time that a stop
+    of the contact depth takes (`rigid_collision`). Raises as `simulate_held`.
+    """
+    hand, found = hand or HandMechanics(), np.zeros(len(time_s))
+    for one in _stretches(gun, hand, until_s, dense=True):
+        inside = (time_s >= one.times[0]) & (time_s < one.times[-1])
+        if inside.any() and one.between is not None:
+            found[inside] += [one.phase.rates(0.0, state)[4] for state in one.between(time_s[inside]).T]
+        if one.landed_m_s is not None:
+            found += _blow(gun, hand, time_s - one.times[-1], one.landed_m_s)
+    return found
+
+
+def _blow(gun: GunParameters, hand: HandMechanics, since_s: Vector, speed_m_s: float) -> Vector:
+    """What a landing does to the enclosure, over the time that it takes."""
+    blow = rigid_collision(gun, speed_m_s)
+    if blow.duration_s == 0:
+        return np.zeros(len(since_s))
+    change_m_s = blow.impulse_Ns / (gun.magnet_mass_kg + hand.enclosure_mass_kg)
+    phase = np.clip(since_s / blow.duration_s, 0.0, 1.0) * math.pi
+    return change_m_s * math.pi / (2 * blow.duration_s) * np.sin(phase)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Stretch:
+    """A shot between two events: times and states, and the speed of a landing at its end.
+
+    `between` gives the states at any time of it, if that was asked for.
+    """
+
+    phase: _Phase
+    times: Vector
+    path: Vector
+    between: Callable[[Vector], Vector] | None
+    landed_m_s: float | None
+
+
+def _stretches(gun: GunParameters, hand: HandMechanics, until_s: float, *, dense: bool = False) -> Iterator[_Stretch]:
     if not 0 < until_s < math.inf:
         raise ValueError(f"until_s is {until_s}; it must be a finite time above 0")
-    hand = hand or HandMechanics()
-    t, y, paths, landing, broke = 0.0, np.zeros(6), [], None, 0
+    t, y, broke = 0.0, np.zeros(6), 0
     for _ in range(_MAX_PHASES):
         phase = _phase(gun, hand, t, y, broke)
         limit_s = gun.pulse_s if t < gun.pulse_s < until_s else until_s
-        found: Any = scipy.integrate.solve_ivp(
-            phase.rates, (t, limit_s), y, _method(gun), rtol=_RTOL, atol=_ATOL, events=_events(phase), max_step=2e-3
-        )
+        how: dict[str, Any] = {"rtol": _RTOL, "atol": _ATOL, "max_step": 2e-3, "dense_output": dense}
+        found: Any = scipy.integrate.solve_ivp(phase.rates, (t, limit_s), y, _method(gun), events=_events(phase), **how)
         if found.status < 0:
             raise RuntimeError(f"the held shot stopped at {found.t[-1]:g} s: {found.message}")
-        paths.append(found.y)
         t, y = float(found.t[-1]), found.y[:, -1].copy()
-        if found.status == 1 and phase.way < 0 and len(found.t_events[1]):
-            landing = landing if landing or t < gun.pulse_s else (t, -float(y[1]))
+        landed = found.status == 1 and phase.way < 0 and len(found.t_events[1]) > 0
+        landed_m_s = -float(y[1]) if landed else None
+        yield _Stretch(phase=phase, times=found.t, path=found.y, between=found.sol, landed_m_s=landed_m_s)
         if t >= until_s:
-            return _held(gun, hand, np.concatenate(paths, axis=1), landing)
+            return
         broke = (1 if len(found.t_events[0]) else -1) if found.status == 1 and phase.way == 0 else 0
         _settle(phase, found, t, y)
     raise RuntimeError(f"the held shot came to {t:g} s in {_MAX_PHASES} stretches; the magnet hardly moves or rests")
+
+
+def _landing(gun: GunParameters, stretches: list[_Stretch]) -> tuple[float, float] | None:
+    """When and how fast the magnet landed first after the pulse."""
+    landings = ((float(one.times[-1]), one.landed_m_s) for one in stretches if one.landed_m_s is not None)
+    return next((landing for landing in landings if landing[0] >= gun.pulse_s), None)
 
 
 def _method(gun: GunParameters) -> Literal["DOP853", "Radau"]:
@@ -180,7 +233,9 @@ def _settle(phase: _Phase, found: Any, t: float, y: Vector) -> None:
         y[2] = 0.0
 
 
-def _held(gun: GunParameters, hand: HandMechanics, path: Vector, landing: tuple[float, float] | None) -> HeldShot:
+def _held(gun: GunParameters, hand: HandMechanics, stretches: list[_Stretch]) -> HeldShot:
+    path, landing = np.concatenate([one.path for one in stretches], axis=1), _landing(gun, stretches)
+    turns = (float(one.times[-1]) for one in stretches[:-1] if one.phase.way > 0 and one.times[-1] != gun.pulse_s)
     x, v, _, X, V, impulse = path
     felt = hand.stiffness_N_m * X + hand.damping_N_s_m * V
     momentum = (gun.magnet_mass_kg + hand.enclosure_mass_kg) * V[-1] - gun.magnet_mass_kg * v[-1]
@@ -188,6 +243,7 @@ def _held(gun: GunParameters, hand: HandMechanics, path: Vector, landing: tuple[
         peak_hand_force_N=float(np.abs(felt).max()),
         peak_kick_m=float(X.max()),
         max_displacement_m=float(x.max()),
+        turn_s=next(turns, None),
         reset_end_s=landing[0] if landing else None,
         impact_speed_m_s=landing[1] if landing else None,
         residual_impulse_Ns=float(momentum + impulse[-1]),
