@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import cast
@@ -22,9 +23,32 @@ from device.methods import Method
 from device.plugin.guard import GuardedGun, PluginError, answer_within
 from device.words import Gun, LinkError
 
-GROUP = "recoil.guns"
-OUR_OWN = ("simulated", "serial")
-"""Names that no plug-in can have."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PluginKind:
+    """What a plug-in may be: the group of its entry points, and what it is called.
+
+    `own` are names that no plug-in can have, `ours` the addresses of our own.
+    """
+
+    group: str
+    name: str
+    own: tuple[str, ...]
+    ours: str
+
+
+GUN_PLUGINS = PluginKind(
+    group="recoil.guns",
+    name="gun plug-in",
+    own=("simulated", "serial"),
+    ours='"simulated" or "serial:PORT"',
+)
+SENSOR_PLUGINS = PluginKind(
+    group="recoil.sensors",
+    name="sensor plug-in",
+    own=("simulated", "csv"),
+    ours='"simulated" or "csv:PATH"',
+)
 IMPORT_S = 20.0
 """So long the import of a plug-in may take; PsychoPy's takes less. Assumed."""
 PLUGIN_OPEN_S = 10.0
@@ -33,9 +57,9 @@ GUN_COMMANDS: dict[str, int] = {"identify": 0, "arm": 0, "fire": 2, "disarm": 0,
 """What a gun has, and how many parameters each is called with."""
 
 
-def plugin_names() -> tuple[str, ...]:
-    """The names of the gun plug-ins that are installed."""
-    return tuple(sorted({point.name for point in entry_points(group=GROUP)} - {*OUR_OWN}))
+def plugin_names(kind: PluginKind = GUN_PLUGINS) -> tuple[str, ...]:
+    """The names of the plug-ins of a kind that are installed."""
+    return tuple(sorted({point.name for point in entry_points(group=kind.group)} - {*kind.own}))
 
 
 def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
@@ -48,7 +72,7 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
         raise PluginError(f"{address}: {error}") from error
     except Exception as error:
         raise PluginError(f"gun plug-in {name} did not open {rest!r}: {type(error).__name__}: {error}") from error
-    _check_commands(name, gun)
+    check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")
     return GuardedGun(name, cast("Gun", gun), methods, clock)
 
 
@@ -79,18 +103,18 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
         raise PluginError(f"gun plug-in {name}: its import {ended}: {said.rpartition(chr(10))[2] or 'it said nothing'}")
 
 
-def entry_of(name: str) -> EntryPoint:
+def entry_of(name: str, kind: PluginKind = GUN_PLUGINS) -> EntryPoint:
     """The one entry point of that name. `ValueError`: there is none; `PluginError`: two packages have it."""
-    found = [point for point in entry_points(group=GROUP) if point.name == name and name not in OUR_OWN]
+    found = [point for point in entry_points(group=kind.group) if point.name == name and name not in kind.own]
     if not found:
-        known = ", ".join(plugin_names()) or "none is"
+        known = ", ".join(plugin_names(kind)) or "none is"
         raise ValueError(
-            f'address is {name!r}; it must be "simulated" or "serial:PORT", or begin with the name of a gun plug-in '
-            f"that is installed beside Recoil ({known})"
+            f"address is {name!r}; it must be {kind.ours}, or begin with the name of a {kind.name} that is installed "
+            f"beside Recoil ({known})"
         )
     if len({point.value for point in found}) > 1:
         packages = ", ".join(sorted(_package(point) for point in found))
-        raise PluginError(f"gun plug-in {name}: several packages bring it: {packages}; uninstall all but one")
+        raise PluginError(f"{kind.name} {name}: several packages bring it: {packages}; uninstall all but one")
     return found[0]
 
 
@@ -108,17 +132,14 @@ def _loaded(point: EntryPoint) -> Callable[..., object]:
     return cast("Callable[..., object]", make)
 
 
-def _check_commands(name: str, gun: object) -> None:
-    """`PluginError` names the commands that a gun lacks, or that do not take what a gun's take."""
-    lacking = [command for command in GUN_COMMANDS if not callable(getattr(gun, command, None))]
+def check_commands(who: str, made: object, commands: Mapping[str, int], what: str) -> None:
+    """`PluginError` names the commands that `what` has and `made` lacks, or that do not take as many parameters."""
+    lacking = [command for command in commands if not callable(getattr(made, command, None))]
     if lacking:
-        raise PluginError(
-            f"gun plug-in {name}: {type(gun).__name__} has no {', '.join(lacking)}; "
-            f"a gun has {', '.join(GUN_COMMANDS)} (device.Gun)"
-        )
-    for command, count in GUN_COMMANDS.items():
+        raise PluginError(f"{who}: {type(made).__name__} has no {', '.join(lacking)}; {what} has {', '.join(commands)}")
+    for command, count in commands.items():
         try:
-            inspect.signature(getattr(gun, command)).bind(*[None] * count)
+            inspect.signature(getattr(made, command)).bind(*[None] * count)
         except TypeError as error:
             wanted = f"{command}({'shot, at_s' if count else ''})"
-            raise PluginError(f"gun plug-in {name}: it cannot be called as {wanted}: {error}") from error
+            raise PluginError(f"{who}: it cannot be called as {wanted}: {error}") from error

@@ -1,0 +1,85 @@
+"""The sensor's own process, `python -m device.sensor ADDRESS`; it ends with the run that started it."""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+import time
+from collections import deque
+
+from device.sensor.door import open_sensor
+from device.sensor.link import SensorReady, SensorSaid, asked_of, said_line
+from device.sensor.process import LEAST_RATE_HZ, SAMPLES_S, SampleBuffer, ShotAsked
+from device.sensor.streams import Sensor, SensorError, checked_samples
+from device.words import DeviceError
+
+READ_EVERY_S = 0.01
+FIRST_SAMPLES_S = 5.0
+"""So long a sensor that was opened may take until it has given a second of samples."""
+
+
+def serve_sensor(address: str, out: int) -> None:
+    """Read the sensor, and answer what stdin asks. `DeviceError`, `ValueError`: why it ended."""
+    sensor = open_sensor(address, time.monotonic)
+    try:
+        buffer = SampleBuffer()
+        _become_ready(sensor, buffer)
+        ready = SensorReady(rate_Hz=buffer.rate_Hz, noise_m_s2=buffer.noise_m_s2())
+        os.write(out, said_line(SensorSaid(ready=ready)))
+        asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
+        threading.Thread(target=_listen, args=(asked,), daemon=True).start()
+        waiting = deque[ShotAsked]()
+        while True:
+            _read(sensor, buffer)
+            while not asked.empty():
+                waiting.append(asked.get())
+            while waiting and (reply := buffer.reply_to(waiting[0], time.monotonic())):
+                waiting.popleft()
+                os.write(out, said_line(SensorSaid(reply=reply)))
+            time.sleep(READ_EVERY_S)
+    finally:
+        sensor.close()
+
+
+def _read(sensor: Sensor, buffer: SampleBuffer) -> None:
+    try:
+        said: object = sensor.read()
+    except DeviceError:
+        raise
+    except Exception as error:
+        raise SensorError(f"it broke off: {type(error).__name__}: {error}") from error
+    buffer.take(checked_samples("read", said, buffer.last_s))
+
+
+def _become_ready(sensor: Sensor, buffer: SampleBuffer) -> None:
+    end_s = time.monotonic() + FIRST_SAMPLES_S
+    while buffer.length_s < SAMPLES_S:
+        _read(sensor, buffer)
+        if time.monotonic() > end_s:
+            raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s; is it on?")
+        time.sleep(READ_EVERY_S)
+    if buffer.rate_Hz < LEAST_RATE_HZ:
+        raise SensorError(f"it gives {buffer.rate_Hz:.0f} samples a second; at least {LEAST_RATE_HZ:g} are needed")
+
+
+def _listen(asked: queue.SimpleQueue[ShotAsked]) -> None:
+    for line in sys.stdin.buffer:
+        asked.put(asked_of(line))
+    os._exit(0)  # the run is over, whatever the sensor does
+
+
+def main(address: str) -> int:
+    """0: stdin ended; 1: the last line of stdout says why."""
+    out = os.dup(1)
+    os.dup2(2, 1)  # what a plug-in prints is none of our words
+    try:
+        serve_sensor(address, out)
+    except (DeviceError, ValueError) as error:
+        os.write(out, said_line(SensorSaid(ended=str(error))))
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

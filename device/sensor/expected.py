@@ -1,0 +1,70 @@
+"""What a sensor on the enclosure sees of a good shot by the model, in a hand as assumed, through the same reckoning."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from device.methods import Method
+from device.parameters import GunParameters
+from device.physics.hand import HandMechanics, Vector, held_acceleration, simulate_held
+from device.sensor.measuring import BEFORE_S, ExpectedShot, SensorTrace, measured
+from device.vibration import waveform
+
+_HELD_S = 0.15
+"""The held shot is reckoned for so long: past every magnet's turn."""
+FINE_S = 2e-5
+"""From one moment of a modelled course to the next."""
+_PLACES = 4
+"""So many places between two samples the onset is put at."""
+
+
+def modelled_acceleration(actuator: Method, time_s: Vector, hand: HandMechanics | None = None) -> Vector:
+    """The acceleration in m/s2 that a shot of the method gives to the enclosure, at times from its onset.
+
+    That of a vibration is the device's, as it was measured.
+    """
+    if isinstance(actuator, GunParameters):
+        return held_acceleration(actuator, time_s, hand, _HELD_S)
+    points, course = waveform(actuator, 1 + round(actuator.duration_s / FINE_S))
+    return np.interp(time_s, points, course, 0.0, 0.0)
+
+
+@lru_cache(maxsize=64)
+def expected_shot(actuator: Method, rate_Hz: float, hand: HandMechanics | None = None) -> ExpectedShot | None:
+    """What is expected of a shot at so many samples a second; `None` where nothing moves.
+
+    The means over several places of the samples, and their standard deviations.
+    """
+    hand = hand or HandMechanics()
+    fine = np.arange(0.0, _HELD_S, FINE_S)
+    course = modelled_acceleration(actuator, fine, hand)
+    peak = float(np.abs(course).max())
+    if peak == 0.0:
+        return None
+    top = int(np.abs(course[: round(0.012 / FINE_S)]).argmax())
+    rise_s = float(fine[int((np.abs(course) >= abs(course[top]) / 2).argmax())])
+    turn_s = simulate_held(actuator, hand, _HELD_S).turn_s if isinstance(actuator, GunParameters) else None
+    raw = ExpectedShot(peak_m_s2=abs(float(course[top])), rise_s=rise_s, mass_kg=hand.enclosure_mass_kg, turn_s=turn_s)
+    return _as_measured(raw, fine, course, rate_Hz)
+
+
+def _as_measured(raw: ExpectedShot, fine: Vector, course: Vector, rate_Hz: float) -> ExpectedShot:
+    grid = np.arange(-BEFORE_S, raw.until_s, 1 / rate_Hz)
+    places = [grid + place / _PLACES / rate_Hz for place in range(_PLACES)]
+    shots = [
+        shot
+        for times in places
+        if (shot := measured(SensorTrace(time_s=times, acceleration_m_s2=np.interp(times, fine, course)), 0.0, raw))
+    ]
+    frictions = [shot.friction_N for shot in shots if shot.friction_N is not None]
+    return replace(
+        raw,
+        peak_m_s2=float(np.mean([shot.peak_m_s2 for shot in shots])),
+        peak_sampling_m_s2=float(np.std([shot.peak_m_s2 for shot in shots])),
+        rise_s=raw.rise_s + float(np.mean([shot.onset_s for shot in shots])),
+        friction_N=float(np.mean(frictions)) if frictions else None,
+        friction_sampling_N=float(np.std(frictions)) if frictions else 0.0,
+    )

@@ -1,0 +1,162 @@
+"""The run's end of a sensor: a process of its own reads it and measures. It may hang, lie or die.
+
+A line of JSON each way: shots go out; back comes that it is ready, what was measured, or why it ended.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Protocol
+
+from pydantic import TypeAdapter, ValidationError
+
+from device.methods import Method
+from device.sensor.process import SAMPLES_S, ShotAsked, ShotReply
+from device.sensor.streams import SensorError
+
+START_S = 30.0
+"""So long a sensor may take to be imported, opened and heard."""
+SENSOR_ANSWER_S = 5.0
+"""So long after its time an answer may take; a busy machine stands still for some of it."""
+_LONGEST_S = 0.5
+"""No trace goes on for longer after its pulse."""
+_ENDED_S = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorReady:
+    """A sensor that is heard: samples a second, and their noise at rest."""
+
+    rate_Hz: float
+    noise_m_s2: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorSaid:
+    """One thing that the sensor's process says."""
+
+    ready: SensorReady | None = None
+    reply: ShotReply | None = None
+    ended: str = ""
+
+
+_SAID, _ASKED = TypeAdapter(SensorSaid), TypeAdapter(ShotAsked)
+
+
+def said_line(said: SensorSaid) -> bytes:
+    """What is said as a line."""
+    return json.dumps(asdict(said)).encode() + b"\n"
+
+
+def asked_of(line: bytes) -> ShotAsked:
+    """The shot on a line."""
+    return _ASKED.validate_json(line)
+
+
+class SensorEnd(Protocol):
+    """Whoever measures shots for a run. `immediate`: it needs no time to pass."""
+
+    address: str
+    immediate: bool
+
+    def ask(self, pulse_start_s: float, actuator: Method) -> ShotReply:
+        """What was measured of a shot; it waits for it. `SensorError`: it ended, and is asked no more."""
+
+    def close(self) -> None:
+        """Let go of it."""
+
+
+class SensorLink:
+    """A sensor in its own process. `SensorError`: it is refused, and why."""
+
+    immediate = False
+
+    def __init__(self, address: str, start_s: float = START_S) -> None:
+        self.address = address
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "device.sensor", address],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            start_new_session=True,  # Ctrl-C is for the run, which closes it
+        )
+        self._said: queue.Queue[SensorSaid] = queue.Queue()
+        self._count = 0
+        threading.Thread(target=self._listen, daemon=True, name="sensor").start()
+        try:
+            ready = self._heard(
+                start_s, f"was not ready within {start_s:g} s; did its import or its device hang?"
+            ).ready
+            if ready is None:
+                raise SensorError(f"{self.address}: spoke of a shot before it was ready")
+        except BaseException:
+            self.close()
+            raise
+        self.ready = ready
+
+    def ask(self, pulse_start_s: float, actuator: Method) -> ShotReply:
+        """What was measured of a shot. `SensorError`: it ended, or does not answer."""
+        self._count += 1
+        asked = ShotAsked(number=self._count, pulse_start_s=pulse_start_s, actuator=actuator)
+        try:
+            if self._process.stdin is None:
+                raise BrokenPipeError
+            self._process.stdin.write(json.dumps(asdict(asked)).encode() + b"\n")
+            self._process.stdin.flush()
+        except OSError:
+            pass  # it has ended, and says why below
+        wait_s = max(0.0, pulse_start_s - time.monotonic()) + _LONGEST_S + SAMPLES_S + SENSOR_ANSWER_S
+        reply = self._heard(wait_s, "does not answer").reply
+        if reply is None or reply.number != self._count:
+            raise SensorError(f"{self.address}: answered another shot than it was asked for")
+        return reply
+
+    def close(self) -> None:
+        """End the process."""
+        with suppress(OSError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+        try:
+            self._process.wait(_ENDED_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    def _heard(self, seconds: float, silent: str) -> SensorSaid:
+        try:
+            said = self._said.get(timeout=seconds)
+        except queue.Empty:
+            raise SensorError(f"{self.address}: {silent}") from None
+        if said.ended:
+            self._said.put(said)  # for whoever asks again
+            raise SensorError(f"{self.address}: {said.ended}")
+        return said
+
+    def _listen(self) -> None:
+        """Take what it says, until it ends."""
+        ended = ""
+        with suppress(ValueError, OSError):  # closed meanwhile
+            for line in self._process.stdout or ():
+                try:
+                    said = _SAID.validate_json(line)
+                except ValidationError:
+                    said = SensorSaid(ended="its process said what cannot be")
+                ended = said.ended
+                self._said.put(said)
+        if not ended:
+            code = self._process.wait()
+            how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+            self._said.put(SensorSaid(ended=f"its process {how}"))

@@ -1,0 +1,105 @@
+"""What the sensor's own process does: it keeps the last samples, and answers what they show of a shot. Pure."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from device.methods import Method
+from device.sensor.expected import expected_shot
+from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
+from device.sensor.streams import Sample
+
+KEPT_S = 5.0
+"""Samples of so long are kept."""
+SAMPLES_S = 1.0
+"""A shot whose trace is not whole so long after its end is not measured. A sensor is ready once it gave so much."""
+LEAST_RATE_HZ = 1500.0
+"""With fewer samples a second the recoil's peak, which is over in 2 ms, is lost between them."""
+MAX_GAP_S = 0.005
+_RATE_STEP = 0.01
+"""The rate is taken in steps of 1 %, so that what is expected is reckoned once."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotAsked:
+    """A shot to be measured: its pulse on the host's monotonic clock, and the actuator with its drive."""
+
+    number: int
+    pulse_start_s: float
+    actuator: Method
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotReply:
+    """What was seen of a shot, and what was expected. `because`: why it was not measured; else `None` is no peak."""
+
+    number: int
+    seen: DeliveredShot | None = None
+    expected: ExpectedShot | None = None
+    because: str = ""
+
+
+class SampleBuffer:
+    """The last samples, and what they show."""
+
+    def __init__(self) -> None:
+        self._samples: deque[Sample] = deque()
+
+    @property
+    def last_s(self) -> float:
+        """The time of the last sample; without end before the first."""
+        return self._samples[-1][0] if self._samples else -np.inf
+
+    @property
+    def length_s(self) -> float:
+        """How long they cover."""
+        return self.last_s - self._samples[0][0] if self._samples else 0.0
+
+    @property
+    def rate_Hz(self) -> float:  # noqa: N802 - the unit ends the name
+        """Samples a second; 0 where there are too few to say."""
+        return (len(self._samples) - 1) / self.length_s if self.length_s > 0 else 0.0
+
+    def take(self, samples: Iterable[Sample]) -> None:
+        """Keep new ones, and let old ones go."""
+        self._samples.extend(samples)
+        while self.length_s > KEPT_S:
+            self._samples.popleft()
+
+    def noise_m_s2(self) -> float:
+        """The standard deviation at rest: the median of those of 50 ms each."""
+        values = np.array([value for _, value in self._samples])
+        return float(np.median([part.std() for part in np.array_split(values, max(1, round(20 * self.length_s)))]))
+
+    def reply_to(self, shot: ShotAsked, now_s: float) -> ShotReply | None:
+        """What was measured of a shot; `None` as long as its trace is not whole."""
+        expected = expected_shot(shot.actuator, _stepped(self.rate_Hz)) if self.rate_Hz > LEAST_RATE_HZ else None
+        if expected is None:
+            why = "nothing moves in this shot by the model" if self.rate_Hz > LEAST_RATE_HZ else "too few samples"
+            return ShotReply(number=shot.number, because=why)
+        reply = ShotReply(number=shot.number, expected=expected)
+        end_s = shot.pulse_start_s + expected.until_s
+        if self.last_s < end_s:
+            late = now_s > end_s + SAMPLES_S
+            return replace(reply, because="the sensor gave no samples of it") if late else None
+        try:
+            trace = self._trace(shot.pulse_start_s - BEFORE_S, end_s)
+            return replace(reply, seen=measured(trace, shot.pulse_start_s, expected))
+        except ValueError as error:
+            return replace(reply, because=str(error))
+
+    def _trace(self, start_s: float, end_s: float) -> SensorTrace:
+        """The samples of a time. `ValueError`: some are missing."""
+        found = np.array([one for one in self._samples if start_s <= one[0] < end_s]).reshape(-1, 2)
+        gap_s = float(np.diff(found[:, 0], prepend=start_s, append=end_s).max())
+        if gap_s > MAX_GAP_S:
+            raise ValueError(f"its trace has a gap of {gap_s:.3f} s")
+        return SensorTrace(time_s=found[:, 0], acceleration_m_s2=found[:, 1])
+
+
+def _stepped(rate_Hz: float) -> float:
+    return float(np.exp(_RATE_STEP * round(np.log(rate_Hz) / _RATE_STEP)))
