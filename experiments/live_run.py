@@ -22,7 +22,7 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import Remark, remark_record
+from experiments.session.remarks import Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Session, Step, step_after, step_record
 
@@ -295,7 +295,7 @@ class LiveRun:
     def _submit(self, remark: Remark) -> Future[None] | None:
         """Have a remark written; `None` if the journal is closed, as the run has just ended."""
         try:
-            written = self.journal.submit("remark", body=remark_record(remark))
+            written = self.journal.submit(remark_kind(remark), body=remark_record(remark))
         except RuntimeError:
             return None
         self._told.append((None, remark))

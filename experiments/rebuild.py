@@ -10,6 +10,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.record import design_table, replay
 from experiments.record.journal import ENDING, Contents, Head, JournalError, read_journal
+from experiments.record.shots_table import SHOTS, shot_rows
 from experiments.record.tables import table_bytes
 
 JOURNAL_NAME = re.compile(r"sub-([A-Za-z0-9]{1,32})_task-([a-z]+)(_practice)?_journal(\.aside-[0-9]+)?\.jsonl$")
@@ -33,6 +34,12 @@ def table(contents: Contents) -> bytes:
     design = began_with(contents.head)
     rows = design_table.design_rows(contents.plan, replay.history(contents), design)
     return table_bytes(design_table.columns(design), rows)
+
+
+def shots_table(contents: Contents) -> bytes | None:
+    """The CSV of what a sensor measured, one row a shot; `None` where there was none."""
+    rows = shot_rows(contents.plan, replay.history(contents))
+    return table_bytes(SHOTS, rows) if rows else None
 
 
 def misnamed(path: Path, plan: Plan) -> str:

@@ -6,10 +6,10 @@ import hashlib
 import os
 import shlex
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from device import Gun, open_gun
 from experiments.clock import Clock, date_text
@@ -21,7 +21,7 @@ from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import checked_seed, draw_seed
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
-from experiments.rebuild import began_with, table
+from experiments.rebuild import began_with, shots_table, table
 from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import (
@@ -42,6 +42,9 @@ from experiments.session.steps import Answered, Describe, Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
+
+if TYPE_CHECKING:
+    from experiments.delivered.recorder import ShotRecorder
 
 Again = Literal["ask", "resume", "fresh"]
 """What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
@@ -81,16 +84,18 @@ class ParticipantOptions:
 class RunRequest:
     """Who does what, where, at which screen, with which gun and seed.
 
-    `seed` is `None` where the config or the system gives it. A `practice` is not analysed: it has files of its own and
-    can be done again; nothing of a `training` is kept. `anew_reason` is why an unfinished run is set aside for a fresh
-    one: for the register and the head of the new journal. At the console the participant may have `options` of their
-    own, and a `visual` run is worked by a synthetic one.
+    `sensor` is empty where nothing measures what is delivered. `seed` is `None` where the config or the system gives
+    it. A `practice` is not analysed: it has files of its own and can be done again; nothing of a `training` is kept.
+    `anew_reason` is why an unfinished run is set aside for a fresh one: for the register and the head of the new
+    journal. At the console the participant may have `options` of their own, and a `visual` run is worked by a
+    synthetic one.
     """
 
     setup: Setup[DesignConfig]
     participant_id: str
     results: Path
     gun: str = "simulated"
+    sensor: str = ""
     seed: int | None = None
     again: Again = "ask"
     anew_reason: str = ""
@@ -149,7 +154,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         stimuli.work_out(plan.trials)
         told: GrowingHistory = []
         session, screen = design_session(plan, setup, told), make_screen(setup, plan, clock)
-        with _open(place, before, clock) as journal:
+        with _open_sensor(request, plan, stimuli, clock) as recorder, _open(place, before, clock) as journal:
             head = _circumstances(request, gun, clock)
             if before is None:
                 position = _begin(session, journal, request, plan, head)
@@ -157,16 +162,17 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 position = _resume(session, journal, before, head, told)
             live = LiveRun(
                 plan=plan,
-                gun=gun,
+                gun=recorder.gun(gun) if recorder else gun,
                 journal=journal,
                 clock=clock,
-                screen=screen,
+                screen=(screen := recorder.screen(screen) if recorder else screen),
                 guard_s=setup.config.console.guard_s,
                 told=told,
             )
             desk = Desk(live=live, gun_name=gun_name(gun.identify()), stimuli=stimuli)
             screen.begin(live)
-            return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place))
+            settle = recorder.settle if recorder else None
+            return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
 
 
 def _refuse_excluded(place: Place, registered: Register) -> None:
@@ -183,6 +189,18 @@ def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Gun:
         return open_gun(request.gun, stimuli.methods, clock=clock.now)
     except ValueError as error:
         raise PlaceError(f"--gun {request.gun}: {error}") from error
+
+
+def _open_sensor(
+    request: RunRequest, plan: Plan, stimuli: Stimuli, clock: Clock
+) -> AbstractContextManager[ShotRecorder | None]:
+    """What measures beside the run, if it was asked for. `SensorError`: it is refused."""
+    if not request.sensor:
+        return nullcontext()
+    from experiments.delivered.recorder import open_recorder  # noqa: PLC0415 - a run without a sensor has none of it
+
+    again = request.setup.config.trial.repeat_undelivered
+    return open_recorder(request.sensor, request.gun, stimuli.methods, clock, again=again, seed=plan.seed)
 
 
 def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
@@ -291,6 +309,7 @@ def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, obj
         "provenance": provenance(),
         "gun": asdict(gun.identify()),
         "clock": clock.name,
+        **({"sensor": request.sensor} if request.sensor else {}),
         "experimenter_knows": ["direction", *dampers, *by_hand(setup.config), *_shown_levels(setup.config)],
         **({"preregistration_sha256": frozen} if frozen else {}),
     }
@@ -324,13 +343,19 @@ def _resume(
     return replay.go_on(session, before, position, journal.append)
 
 
-def _to_the_end(session: Session, desk: Desk, position: RunPosition, place: Place) -> int:
-    """Carry out what is left. If it is stopped, the journal says why and the table holds what was answered.
+def _to_the_end(
+    session: Session, desk: Desk, position: RunPosition, place: Place, settle: Callable[[], None] | None
+) -> int:
+    """Carry out what is left, and have what was measured on the disk (`settle`).
 
-    Gives back the number of answers, read back from the disk.
+    If it is stopped, the journal says why and the table holds what was answered. Gives back the number of answers, read back from the disk.
     """
     try:
-        carry_out(session, desk, position)
+        try:
+            carry_out(session, desk, position)
+        finally:
+            if settle is not None:
+                settle()
     except (KeyboardInterrupt, RunStopped) as stop:
         why = str(stop) or "interrupted"
         desk.live.end(why)
@@ -353,6 +378,9 @@ def _write_table(place: Place, contents: Contents) -> int:
     """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
     design = began_with(contents.head)
+    measured = shots_table(contents)
+    if measured is not None:
+        storage.write_whole(place.shots, measured)
     storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
     told = replay.history(contents)
     return sum(isinstance(word, Answered) and not isinstance(step, Describe) for step, word in told)

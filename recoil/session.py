@@ -15,7 +15,7 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped, Screen
-from experiments.rebuild import rebuild
+from experiments.rebuild import rebuild, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
 from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
@@ -204,7 +204,7 @@ class RebuiltTable:
 
 
 def rebuild_table(path: Path) -> RebuiltTable:
-    """The table of a journal. One that differs from its journal is set aside, not overwritten."""
+    """The table of a journal, and that of what a sensor measured. One that differs from its journal is set aside, not overwritten."""
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
     same = table.exists() and table.read_bytes() == data
@@ -212,4 +212,7 @@ def rebuild_table(path: Path) -> RebuiltTable:
         messages.append(f"{table}: differed from its journal and was set aside as {set_aside_file(table)}")
     if not same:
         storage.write_whole(table, data)
+    measured = shots_table(contents)
+    if measured is not None:
+        storage.write_whole(path.with_name(path.name.replace("_journal", "_shots")).with_suffix(".csv"), measured)
     return RebuiltTable(table=table, rebuilt=not same, messages=tuple(messages))

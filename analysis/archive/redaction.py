@@ -47,7 +47,7 @@ _SAFE = frozenset(
             "experimenter_knows",
             "provenance",
         ),
-        *("trial", "settings", "motion", "method", "question", "event", "state", "because", "flag", "by", "ended_by"),
+        *("trial", "settings", "motion", "method", "question", "event", "state", "because", "flag", "by", "ended_by", "mark"),
     ]
 )
 """Keys whose values are words of the design, of the program or of the gun, or are written anew."""

@@ -242,6 +242,7 @@ class TrialConfig(Model):
     max_shots: ShotCount = 120
     catch: Annotated[int, Field(ge=0, le=MAX_TRIALS)] = 0
     feedback: bool = False
+    repeat_undelivered: bool = False
 
     @property
     def intervals(self) -> int:

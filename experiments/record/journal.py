@@ -27,7 +27,7 @@ from experiments.record import storage
 
 ParticipantKind = Literal["person", "synthetic"]
 """Who does a run."""
-Kind = Literal["run", "step", "outcome", "shot", "remark", "resumed", "stopped", "finished"]
+Kind = Literal["run", "step", "outcome", "shot", "remark", "measured", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)
 ENDING = "_journal.jsonl"
 """How the name of every journal ends."""
@@ -48,8 +48,9 @@ class JournalGone(JournalError):  # noqa: N818 - what is so, not what went wrong
 class Record:
     """A line of a journal after its first: when it was written, and what it holds.
 
-    `body` is a step, outcome, shot or remark as JSON, which their own types read. `shown_s` of an outcome is when the
-    console had painted its step, `reason` of a stop is why, `clock` of a resumption is which; else they are empty.
+    `body` is a step, outcome, shot, remark or a sensor's word as JSON, which their own types read. `shown_s` of an
+    outcome is when the console had painted its step, `reason` of a stop is why, `clock` of a resumption is which; else
+    they are empty.
     """
 
     n: int

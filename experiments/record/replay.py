@@ -46,6 +46,10 @@ def history(contents: Contents) -> History:
     return found
 
 
+_REMARKS = ("remark", "measured")
+"""Records that belong to no step: what was said, and what a sensor measured."""
+
+
 def _read(contents: Contents, found: GrowingHistory) -> Iterator[steps.Step]:
     """The steps of a journal's records, each when it is there; what lies before it is in `found` by then."""
     step: steps.Step | None = None
@@ -55,7 +59,7 @@ def _read(contents: Contents, found: GrowingHistory) -> Iterator[steps.Step]:
             step = read_as(steps.STEP, line.body, _place(contents, line))
             _check_trial(contents, line, steps.trial_of(step), planned)
             yield step
-        elif line.kind == "remark":
+        elif line.kind in _REMARKS:
             remark = _remark(contents, line)
             _check_trial(contents, line, getattr(remark, "trial", None), planned)
             if isinstance(remark, EntryCorrected):

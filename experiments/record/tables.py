@@ -96,7 +96,8 @@ FLAGS = text_column(
     "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
     "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), `clock-set-back` (the "
     "computer's date and time went back since the trial before), `at-edge` (a procedure chose the end of its levels, "
-    "and may have gone on), `track-over` (not presented: the track had ended), and the experimenter's own",
+    "and may have gone on), `track-over` (not presented: the track had ended), `not-delivered` (of the last presentation "
+    "a sensor says so), and the experimenter's own",
 )
 NOTE = text_column("note", "the experimenter's note")
 ONSET = text_column(
@@ -235,9 +236,16 @@ def _flags(events: TrialHistory) -> list[str]:
         "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
         "repeated": events.repeated,
         "corrected": any(_is_corrected(events.entered(name)) for name in events.questions),
+        "not-delivered": any(one.mark in remarks.NOT_DELIVERED for one in _last_measured(events)),
     }
     own = [remark.flag for remark in events.all(remarks.Flagged)]
     return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
+
+
+def _last_measured(events: TrialHistory) -> list[remarks.ShotMeasured]:
+    """What a sensor measured of the last presentation."""
+    found = events.all(remarks.ShotMeasured)
+    return [one for one in found if one.attempt == found[-1].attempt]
 
 
 def _is_corrected(entered: list[Answered | remarks.EntryCorrected]) -> bool:

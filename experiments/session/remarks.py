@@ -101,7 +101,42 @@ class TestShot:
     kind: Literal["test-shot"] = "test-shot"
 
 
-Remark = EntryCorrected | Flagged | Noted | Paused | Continued | Refused | Halted | HaltReason | TestShot
+DeliveryMark = Literal["", "no-peak", "outside", "slipped", "not-measured"]
+"""What a sensor says against a shot: nothing, or that none came, that this one is not what the model allows, that the
+last ones together are not, or that it was not measured."""
+NOT_DELIVERED: tuple[DeliveryMark, ...] = ("no-peak", "outside", "slipped")
+"""The marks of a shot that was not delivered as the model says."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotMeasured:
+    """What a sensor beside the gun measured of one shot, with standard uncertainties (`_u_`), and what was expected.
+
+    `shot` counts from 1 in a presentation, `interval` from 0. `pulse_start_s` is the gun's own word, `onset_s` the
+    measured onset after it. What was not measured is `None`; `because` says why there is a mark.
+    """
+
+    trial: Trial
+    attempt: int
+    interval: int = 0
+    shot: int
+    method: str
+    sensor: str
+    pulse_start_s: float
+    mark: DeliveryMark = ""
+    because: str = ""
+    onset_s: float | None = None
+    onset_u_s: float | None = None
+    peak_m_s2: float | None = None
+    peak_u_m_s2: float | None = None
+    expected_peak_m_s2: float | None = None
+    friction_N: float | None = None
+    friction_u_N: float | None = None
+    expected_friction_N: float | None = None
+    kind: Literal["measured"] = "measured"
+
+
+Remark = EntryCorrected | Flagged | Noted | Paused | Continued | Refused | Halted | HaltReason | TestShot | ShotMeasured
 
 MAX_FLAG = 32
 
@@ -126,3 +161,8 @@ REMARK: TypeAdapter[Remark] = TypeAdapter(
 def remark_record(remark: Remark) -> dict[str, object]:
     """A remark as plain JSON values."""
     return asdict(remark, dict_factory=without_blanks)
+
+
+def remark_kind(remark: Remark) -> Literal["remark", "measured"]:
+    """The kind of a remark's record: a sensor's word has one of its own."""
+    return "measured" if isinstance(remark, ShotMeasured) else "remark"

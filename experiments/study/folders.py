@@ -79,6 +79,11 @@ class Place:
         suffix = self.suffix or tables.FILE_SUFFIX.get(self.experiment, "trials")
         return self.folder / f"{self.stem}_{suffix}.csv"
 
+    @property
+    def shots(self) -> Path:
+        """What a sensor measured of each shot; only where there was one."""
+        return self.folder / f"{self.stem}_shots.csv"
+
 
 def is_code(text: str) -> bool:
     """Whether a text can be a participant's code."""
@@ -123,7 +128,7 @@ def known_codes(results: Path, registered: Register) -> list[str]:
 
 def set_aside(run: Place) -> list[Path]:
     """Rename a run's files so that a fresh one can begin; nothing is lost. Returns the new names."""
-    return [set_aside_file(path) for path in (run.journal, run.table) if path.exists()]
+    return [set_aside_file(path) for path in (run.journal, run.table, run.shots) if path.exists()]
 
 
 def set_aside_file(path: Path) -> Path:

@@ -156,7 +156,7 @@ class RunSoFar:
                 self._told.append((step, word))
                 self._timing.saved(word, record.monotonic_s)
                 self._note(word, record)
-            case "remark":
+            case "remark" | "measured":
                 _, word = next(words)
                 self._told.append((None, word))
                 self._moved(word, record)
@@ -267,6 +267,8 @@ def fault_text(word: object) -> str:
             return f"emergency stop, by the {word.by}"
         case remarks.TestShot(cause=cause) if cause:
             return f"the test shot failed: {cause}"
+        case remarks.ShotMeasured(mark=mark) if mark in remarks.NOT_DELIVERED:
+            return f"trial {word.trial.trial}: not delivered: {word.because}"
         case _:
             return ""
 

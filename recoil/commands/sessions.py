@@ -39,6 +39,9 @@ ParticipantOption = Annotated[
     str | None, typer.Option(help="Participant's code, 1 to 32 letters and digits; without: the start window.")
 ]
 GunAddressOption = Annotated[str, typer.Option(help="`simulated`, `serial:PORT` or a plug-in's `NAME:...`.")]
+SensorOption = Annotated[
+    str, typer.Option(help="Measure what is delivered: `csv:PATH`, a plug-in's `NAME:...` or `simulated`.")
+]
 ScreenOption = Annotated[ScreenChoice, typer.Option(help="Where the run takes place.")]
 ResultsOption = Annotated[Path, typer.Option(help="Folder for the logs.")]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with an unfinished run.")]
@@ -67,6 +70,7 @@ def run(
     config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
     participant: ParticipantOption = None,
     gun: GunAddressOption = "simulated",
+    sensor: SensorOption = "",
     screen: ScreenOption = ScreenChoice.terminal,
     results: ResultsOption = Path("results"),
     seed: SeedOption = None,
@@ -92,6 +96,7 @@ def run(
         participant_id=participant or "",
         results=results,
         gun=gun,
+        sensor=sensor,
         seed=seed,
         again=session.again(resume=resume, fresh=fresh, reason=reason),
         anew_reason=reason,

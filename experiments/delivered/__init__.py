@@ -1,0 +1,1 @@
+"""Was the shot delivered? A sensor beside the gun: its word on each shot, the marks, and the record."""

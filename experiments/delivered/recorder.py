@@ -1,0 +1,304 @@
+"""A run's shots handed to a sensor, and its word on each put into the journal: beside the run, which waits for nothing.
+
+The gun and the screen are wrapped: the gun's reports tell of shots, the screen's positions when a trial can come again.
+A run without a sensor has neither wrapper.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from device import Gun, GunStatus, Shot, ShotReport
+from device.methods import Method
+from device.parameters import GunParameters
+from device.sensor.link import SensorEnd, SensorLink
+from device.sensor.process import ShotReply
+from device.sensor.simulated import SimulatedSensor
+from device.sensor.streams import SensorError
+from device.words import Identity, Pulse
+from experiments.clock import Clock
+from experiments.delivered.marks import FRICTION_SPREAD, PEAK_SPREAD, DeliveryLevel, after_shot
+from experiments.live_run import LiveRun, Screen
+from experiments.session import events, judging
+from experiments.session.remarks import NOT_DELIVERED, DeliveryMark, Noted, Remark, ShotMeasured
+from experiments.session.states import ARMED, Position, State
+from experiments.session.steps import FireShot, Outcome, Present, Repeated, Step
+
+SETTLED_S = 8.0
+"""So long the end of a run waits for what was measured last."""
+REPEAT_REASON = "not delivered"
+"""The reason of every repeat that a sensor asks for begins so."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotFired:
+    """A shot that the gun reported, and of which presentation it was."""
+
+    step: FireShot | Present
+    shot: int
+    report: ShotReport
+
+
+@contextmanager
+def open_recorder(
+    address: str, gun: str, methods: Mapping[str, Method], clock: Clock, *, again: bool, seed: int
+) -> Iterator[ShotRecorder]:
+    """The recorder of a run. `SensorError`: the sensor is refused, or can measure no such gun on no such clock."""
+    simulated = address.partition(":")[0] == "simulated"
+    if simulated and gun != "simulated":
+        raise SensorError(f"--sensor {address}: goes with --gun simulated; it would measure nothing of {gun}")
+    if not simulated and clock.name != "real":
+        raise SensorError(
+            f"--sensor {address}: measures in real time, and this run's clock is {clock.name}; use a screen for people "
+            "and a gun that takes its time, or --sensor simulated"
+        )
+    try:
+        end: SensorEnd = SimulatedSensor(address, seed) if simulated else SensorLink(address)
+    except SensorError as error:
+        raise SensorError(f"--sensor {error}") from error
+    recorder = ShotRecorder(end, methods, beside=clock.name != "virtual", again=again)
+    try:
+        yield recorder
+    finally:
+        recorder.settle()
+        recorder.close()
+
+
+class ShotRecorder:
+    """What a sensor says of a run's shots. `beside`: in a thread of its own; else at once, where no time passes."""
+
+    def __init__(self, end: SensorEnd, methods: Mapping[str, Method], *, beside: bool, again: bool) -> None:
+        self._end, self._methods, self._beside, self._again = end, methods, beside, again
+        self._live: LiveRun | None = None
+        self._trouble: Callable[[str], None] = lambda _: None
+        self._fired: queue.SimpleQueue[ShotFired | None] = queue.SimpleQueue()
+        self._levels: dict[tuple[str, str], DeliveryLevel] = {}
+        self._step: Step | None = None
+        self._shots = 0
+        self._ended = False
+        self._spoiled: Repeated | None = None
+        self._thread = threading.Thread(target=self._work, daemon=True, name="delivered")
+
+    def gun(self, gun: Gun) -> Gun:
+        """The gun, whose shots are measured."""
+        return MeasuredGun(gun, self)
+
+    def screen(self, screen: Screen) -> Screen:
+        """The screen of the run that is measured."""
+        return MeasuredScreen(screen, self)
+
+    def begin(self, live: LiveRun, trouble: Callable[[str], None]) -> None:
+        """Measure for this run; troubles are told to the experimenter."""
+        self._live, self._trouble = live, trouble
+        if self._beside:
+            self._thread.start()
+
+    def fired(self, report: ShotReport) -> None:
+        """Take a shot; those that belong to no trial, such as a test shot, are let go."""
+        step = self._live.position.step if self._live is not None else None
+        if not isinstance(step, FireShot | Present):
+            return
+        self._shots = self._shots + 1 if step is self._step else 1
+        self._step = step
+        shot = ShotFired(step=step, shot=self._shots, report=report)
+        if self._beside:
+            self._fired.put(shot)
+        else:
+            self._record(shot)
+
+    def settle(self) -> None:
+        """Have everything in the journal that was fired so far, or `SETTLED_S` gone by."""
+        if self._thread.is_alive():
+            self._fired.put(None)
+            self._thread.join(SETTLED_S)
+        self._live = None
+
+    def close(self) -> None:
+        """Let go of the sensor."""
+        self._end.close()
+
+    def offer_again(self) -> None:
+        """Ask for a spoiled trial again, if it can be presented now; let it go when it cannot any more."""
+        live, wanted = self._live, self._spoiled
+        if live is None or wanted is None:
+            return
+        event, moment = events.Repeat(reason=wanted.reason, trial=wanted.trial), live.moment
+        if not judging.event_refusal(moment, event, None):
+            self._spoiled = None
+            live.offer(event)
+        elif moment.position.base not in (*ARMED, State.SAVING) and moment.repeatable != wanted.trial:
+            self._spoiled = None
+
+    # in the thread beside
+
+    def _work(self) -> None:
+        while (shot := self._fired.get()) is not None:
+            self._record(shot)
+
+    def _record(self, shot: ShotFired) -> None:
+        live = self._live
+        if live is None:
+            return
+        found = self._measured(shot)
+        live.remark(found)
+        if found.mark in NOT_DELIVERED:
+            self._tell(live, found)
+            self.offer_again()
+
+    def _measured(self, shot: ShotFired) -> ShotMeasured:
+        method, step = shot.report.shot.method, shot.step
+        blank = ShotMeasured(
+            trial=step.trial,
+            attempt=step.attempt,
+            interval=step.interval if isinstance(step, FireShot) else 0,
+            shot=shot.shot,
+            method=method,
+            sensor=self._end.address,
+            pulse_start_s=shot.report.pulse_start_s,
+            mark="not-measured",
+            because="the sensor had ended",
+        )
+        if self._ended:
+            return blank
+        try:
+            reply = self._end.ask(shot.report.pulse_start_s, driven(self._methods[method], shot.report.shot))
+        except SensorError as error:
+            self._end_of_sensor(str(error))
+            return blank
+        return self._judged(blank, reply)
+
+    def _judged(self, blank: ShotMeasured, reply: ShotReply) -> ShotMeasured:
+        """What was seen of a shot, with its mark."""
+        seen, expected = reply.seen, reply.expected
+        if reply.because or expected is None:
+            return replace(blank, because=reply.because)
+        blank = replace(
+            blank,
+            expected_peak_m_s2=round(expected.peak_m_s2, 3),
+            expected_friction_N=None if expected.friction_N is None else round(expected.friction_N, 5),
+            because="",
+            mark="",
+        )
+        if seen is None:
+            return replace(blank, mark="no-peak", because="no peak showed after the pulse")
+        found = replace(
+            blank,
+            onset_s=round(seen.onset_s - blank.pulse_start_s, 7),
+            onset_u_s=round(seen.onset_u_s, 7),
+            peak_m_s2=round(seen.peak_m_s2, 3),
+            peak_u_m_s2=round(seen.peak_u_m_s2, 3),
+            friction_N=None if seen.friction_N is None else round(seen.friction_N, 5),
+            friction_u_N=None if seen.friction_u_N is None else round(seen.friction_u_N, 5),
+        )
+        marks = [self._mark(found.method, "peak", seen.peak_m_s2, seen.peak_u_m_s2, expected.peak_m_s2)]
+        if seen.friction_N is not None and seen.friction_u_N is not None and expected.friction_N:
+            marks += [self._mark(found.method, "friction", seen.friction_N, seen.friction_u_N, expected.friction_N)]
+        mark, because = next((one for one in marks if one[0]), ("", ""))
+        return replace(found, mark=mark, because=because)
+
+    def _mark(self, method: str, what: str, value: float, u: float, expected: float) -> tuple[DeliveryMark, str]:
+        spread = PEAK_SPREAD if what == "peak" else FRICTION_SPREAD
+        level = self._levels.get((method, what), DeliveryLevel.before(spread))
+        part = value / expected
+        self._levels[method, what], mark = after_shot(level, part, u / expected)
+        unit = "m/s²" if what == "peak" else "N"
+        return (
+            mark,
+            f"{what} {value:.3g} {unit}, {100 * (part / level.mean - 1):+.0f} % from the shots before" if mark else "",
+        )
+
+    def _tell(self, live: LiveRun, found: ShotMeasured) -> None:
+        """Tell the experimenter; where the design says so, the trial is to come again, once."""
+        before = (word for _, word in live.history if isinstance(word, Repeated) and word.trial == found.trial)
+        again = self._again and not any(word.reason.startswith(REPEAT_REASON) for word in before)
+        if again:
+            self._spoiled = Repeated(trial=found.trial, reason=f"{REPEAT_REASON}: {found.because}")
+        self._trouble(
+            f"Trial {found.trial.trial} was not delivered as {found.method} should be: {found.because}. "
+            f"Look at the damper and the coil."
+        )
+
+    def _end_of_sensor(self, why: str) -> None:
+        """Said once; the run goes on without it."""
+        self._ended = True
+        text = f"The sensor ended ({why}). The run goes on; its shots are marked “not-measured”."
+        self._trouble(text)
+        if self._live is not None:
+            self._live.remark(Noted(trial=None, text=text))
+
+
+def driven(actuator: Method, shot: Shot) -> Method:
+    """A method's actuator with the drive that a shot asked for."""
+    if isinstance(actuator, GunParameters) and isinstance(shot.drive, Pulse):
+        return replace(actuator, voltage_V=shot.drive.voltage_V, pulse_s=shot.drive.pulse_s)
+    return actuator
+
+
+class MeasuredGun:
+    """A gun whose shots a recorder is told of; all else is the gun's own."""
+
+    def __init__(self, gun: Gun, recorder: ShotRecorder) -> None:
+        self._gun, self._recorder = gun, recorder
+
+    def identify(self) -> Identity:
+        """Who answers."""
+        return self._gun.identify()
+
+    def arm(self) -> None:
+        """Allow the next shots."""
+        self._gun.arm()
+
+    def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+        """Fire once, and have it measured."""
+        report = self._gun.fire(shot, at_s)
+        self._recorder.fired(report)
+        return report
+
+    def disarm(self) -> None:
+        """Forbid shots."""
+        self._gun.disarm()
+
+    def status(self) -> GunStatus:
+        """The gun at this moment."""
+        return self._gun.status()
+
+    def close(self) -> None:
+        """Disarm and let go of the gun."""
+        self._gun.close()
+
+
+class MeasuredScreen:
+    """A run's screen; at each position that it is shown, a trial that was not delivered may come again."""
+
+    def __init__(self, screen: Screen, recorder: ShotRecorder) -> None:
+        self._screen, self._recorder = screen, recorder
+
+    def begin(self, live: LiveRun) -> None:
+        """Take the place before a run, which is measured from now on."""
+        self._recorder.begin(live, self._screen.trouble)
+        self._screen.begin(live)
+
+    def show(self, position: Position) -> None:
+        """Show a position."""
+        self._screen.show(position)
+        self._recorder.offer_again()
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        """The run waits now."""
+        self._screen.act(position, until_s)
+
+    def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
+        """Show that something is safe."""
+        self._screen.acknowledge(step, word)
+
+    def trouble(self, text: str) -> None:
+        """Show what went wrong."""
+        self._screen.trouble(text)
+
+    def gun_seen(self, status: GunStatus | None, fault: str) -> None:
+        """Show what the gun itself says of its state."""
+        self._screen.gun_seen(status, fault)
