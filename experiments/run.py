@@ -348,7 +348,8 @@ def _to_the_end(
 ) -> int:
     """Carry out what is left, and have what was measured on the disk (`settle`).
 
-    If it is stopped, the journal says why and the table holds what was answered. Gives back the number of answers, read back from the disk.
+    If it is stopped, the journal says why and the table holds what was answered. Gives back the number of answers,
+    read back from the disk.
     """
     try:
         try:

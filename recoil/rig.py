@@ -10,6 +10,7 @@ from typing import Literal
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, with_tables
+from device.parameters import GunParameters
 from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
 from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
@@ -109,15 +110,17 @@ class Examination:
     checks: tuple[DoctorFinding, ...]
 
 
-def examine(results: Path, gun: str, config: str, progress: Progress, shots: int = 0) -> Examination:
+def examine(
+    results: Path, gun: str, config: str, progress: Progress, *, shots: int = 0, sensor: str = ""
+) -> Examination:
     """Carry out every check; `config` is the gun's, with the limit of its line. With `shots` the gun is fired.
 
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
-    findings, planned = (
-        list[DoctorFinding](),
-        checks(results, gun, load_gun(find(config)).serial.round_trip_limit_s, shots),
-    )
+    findings, device = list[DoctorFinding](), load_gun(find(config))
+    actuators = map(device.rendering, device.methods)
+    friction_N = max((one.friction_N for one in actuators if isinstance(one, GunParameters)), default=0.0)
+    planned = checks(results, gun, device.serial.round_trip_limit_s, shots=shots, sensor=sensor, friction_N=friction_N)
     with progress("doctor", len(planned)) as tell:
         for check in planned:
             findings += carry_out_check(check)

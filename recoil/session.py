@@ -204,7 +204,10 @@ class RebuiltTable:
 
 
 def rebuild_table(path: Path) -> RebuiltTable:
-    """The table of a journal, and that of what a sensor measured. One that differs from its journal is set aside, not overwritten."""
+    """The table of a journal, and that of what a sensor measured.
+
+    One that differs from its journal is set aside, not overwritten.
+    """
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
     same = table.exists() and table.read_bytes() == data

@@ -160,10 +160,16 @@ def _friction(time_s: Vector, signal: Vector, noise: float, expected: ExpectedSh
     grid = np.arange(start_s, end_s, 1 / rate_Hz)
     steps = np.correlate(np.interp(grid, time_s, signal), weights, "valid")
     step = float(steps.max())
-    step_u = noise * float(np.sqrt((weights**2).sum()))
-    if step < STEP_NOISES * step_u:
+    friction_N, noise_N = step * expected.mass_kg / 2, friction_uncertainty_N(noise, rate_Hz, expected.mass_kg)
+    if friction_N < STEP_NOISES * noise_N:
         return None
-    return step * expected.mass_kg / 2, math.hypot(step_u * expected.mass_kg / 2, expected.friction_sampling_N)
+    return friction_N, math.hypot(noise_N, expected.friction_sampling_N)
+
+
+def friction_uncertainty_N(noise_m_s2: float, rate_Hz: float, mass_kg: float) -> float:  # noqa: N802 - the unit ends the name
+    """What a sensor's noise leaves uncertain of a friction."""
+    weights = _step_weights(min(MAX_RATE_HZ, rate_Hz))
+    return noise_m_s2 * float(np.sqrt((weights**2).sum())) * mass_kg / 2
 
 
 def _step_weights(rate_Hz: float) -> Vector:

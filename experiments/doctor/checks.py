@@ -32,7 +32,17 @@ from device.plugin.conformance import conformance, rig_at
 from device.serial_gun.gun import speed_of
 from experiments.clock import RealClock
 from experiments.doctor import verdicts
-from experiments.doctor.figures import Adapter, Appends, DoctorFinding, GunLine, Machine, ProgramFigures, Ticks, spread
+from experiments.doctor.figures import (
+    Adapter,
+    Appends,
+    DoctorFinding,
+    GunLine,
+    Machine,
+    ProgramFigures,
+    SensorFigures,
+    Ticks,
+    spread,
+)
 from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
@@ -172,10 +182,13 @@ class Check:
     look: Callable[[], tuple[DoctorFinding, ...]]
 
 
-def checks(results: Path, gun: str, limit_s: float, shots: int = 0) -> tuple[Check, ...]:
+def checks(
+    results: Path, gun: str, limit_s: float, *, shots: int = 0, sensor: str = "", friction_N: float = 0.0
+) -> tuple[Check, ...]:
     """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back.
 
-    With `shots` the gun is fired, in so many trials: nobody is to hold it.
+    With `shots` the gun is fired, in so many trials: nobody is to hold it. Of a `sensor` it is looked at how soon it
+    would see a change of the friction of the gun's damper.
     """
     looks: dict[str, Callable[[], tuple[DoctorFinding, ...]]] = {
         "machine": lambda: (verdicts.of_machine(machine()),),
@@ -183,6 +196,7 @@ def checks(results: Path, gun: str, limit_s: float, shots: int = 0) -> tuple[Che
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
         **({"shots": partial(_shots, gun, shots)} if shots else {}),
+        **({"sensor": partial(_sensor, sensor, friction_N)} if sensor else {}),
         "USB adapter": lambda: (verdicts.of_adapters(adapters()),),
         "display": partial(_on_display, "display", "display"),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
@@ -243,6 +257,22 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
     except OSError as error:
         return (verdicts.of_failure("shots", str(error)),)
     return (verdicts.of_conformance(kept),)
+
+
+def _sensor(address: str, friction_N: float) -> tuple[DoctorFinding, ...]:
+    """A sensor at rest."""
+    from device.physics.hand import HandMechanics  # noqa: PLC0415 - as below
+    from device.sensor import link, measuring  # noqa: PLC0415 - what few rigs have, and slow to import
+    from experiments.delivered.marks import shots_to_see  # noqa: PLC0415
+
+    if address.partition(":")[0] == "simulated":
+        raise PlaceError("--sensor simulated: there is nothing to look at; give csv:PATH or a plug-in's NAME:...")
+    with closing(link.SensorLink(address)) as sensor:
+        ready = sensor.ready
+    uncertain_N = measuring.friction_uncertainty_N(ready.noise_m_s2, ready.rate_Hz, HandMechanics().enclosure_mass_kg)
+    seen = shots_to_see(uncertain_N / friction_N) if friction_N else None
+    found = SensorFigures(sensor=address, rate_Hz=ready.rate_Hz, noise_m_s2=ready.noise_m_s2, shots_to_see=seen)
+    return (verdicts.of_sensor(found),)
 
 
 def _on_display(name: str, program: str, seconds: float = DEADLINE_S) -> tuple[DoctorFinding, ...]:

@@ -164,7 +164,19 @@ class NoFigures:
 
 ProgramFigures = Display | PsychoPyStage | Sound | Keys | MarkerStream
 """What a program of its own looks at."""
-Figures = Machine | Ticks | Appends | GunLine | Adapters | ProgramFigures | ConsoleLatency | NoFigures
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorFigures:
+    """A sensor at rest: samples a second, their noise, and how many shots it takes to see a damper slip by a tenth."""
+
+    sensor: str
+    rate_Hz: float
+    noise_m_s2: float
+    shots_to_see: float | None
+
+
+Figures = Machine | Ticks | Appends | GunLine | Adapters | ProgramFigures | ConsoleLatency | SensorFigures | NoFigures
 
 DoctorVerdict = Literal["good", "warning", "fails", "not there"]
 """`warning`: works, but not as it should; `fails`: a run would suffer; `not there`: this machine has no such thing."""

@@ -192,6 +192,20 @@ def of_conformance(found: Sequence[ConformanceFinding]) -> figures.DoctorFinding
     return figures.DoctorFinding(check="shots", verdict="good", measured=measured, advice="")
 
 
+SOON_SEEN = 3.0
+"""In so many shots a damper that slips by a tenth is to be seen."""
+
+
+def of_sensor(found: figures.SensorFigures) -> figures.DoctorFinding:
+    """A sensor, and whether it sees a damper that slips."""
+    measured = f"{found.sensor}: {found.rate_Hz:.0f} samples/s, noise {found.noise_m_s2:.3f} m/s² at rest"
+    if found.shots_to_see is None:
+        return _judged("sensor", measured, "", found)
+    measured += f"; a damper that slips by 10 % is seen in about {max(1.0, found.shots_to_see):.1f} shots"
+    slow = f"its noise hides it for more than {SOON_SEEN:g} shots: take one of less noise or more samples"
+    return _judged("sensor", measured, slow if found.shots_to_see > SOON_SEEN else "", found)
+
+
 def of_adapters(found: Sequence[figures.Adapter]) -> figures.DoctorFinding:
     """The latency timers of USB serial adapters, where the system shows them."""
     if not found:
@@ -340,6 +354,7 @@ _WINDOWLESS = (
     "libxcb-xkb1 libxkbcommon-x11-0"
 )
 _BROKEN = {
+    "sensor": "check its power, cable and address; the run goes without it",
     "display": _WINDOWLESS,
     "keyboard": _WINDOWLESS,
     "PsychoPy": "see that a display with OpenGL is there, and that the system libraries of PsychoPy are installed",

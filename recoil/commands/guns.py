@@ -113,6 +113,9 @@ def doctor(
     fire: Annotated[
         int, typer.Option(min=0, metavar="TRIALS", help="Fire it so often, and see that it keeps what every gun keeps.")
     ] = 0,
+    sensor: Annotated[
+        str, typer.Option(help="A sensor of what is delivered: `csv:PATH` or a plug-in's `NAME:...`.")
+    ] = "",
     gun_config: Annotated[
         str,
         typer.Option(help="Config of the gun, with the limit of its line's round trip (serial.round_trip_limit_s)."),
@@ -123,7 +126,7 @@ def doctor(
     """The rig's self-test: what was measured, and what to do about what is not good."""
     from recoil import rig as feature
 
-    found = feature.examine(results, gun, gun_config, progress, fire)
+    found = feature.examine(results, gun, gun_config, progress, shots=fire, sensor=sensor)
     show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)

@@ -85,6 +85,7 @@ def lab_day(request: RunRequest) -> None:
     opening = Opening(gun=request.gun, named=named, options=request.options)
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
+            choice = replace(choice, sensor="" if choice.training else request.sensor)
             said = _of_the_day(request, study, choice)
             code = "" if choice.training else choice.participant_id
             opening = Opening(gun=request.gun, options=choice.options, participant_id=code, said=said)
