@@ -18,7 +18,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of, practice_of
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
-from experiments.design.streams import checked_seed, draw_seed
+from experiments.design.streams import checked_seed, draw_seed, generator
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.rebuild import began_with, shots_table, table
@@ -200,7 +200,8 @@ def _open_sensor(
     from experiments.delivered.recorder import open_recorder  # noqa: PLC0415 - a run without a sensor has none of it
 
     again = request.setup.config.trial.repeat_undelivered
-    return open_recorder(request.sensor, request.gun, stimuli.methods, clock, again=again, seed=plan.seed)
+    noise = generator(plan.seed, "sensor", plan.participant_id)
+    return open_recorder(request.sensor, request.gun, stimuli.methods, clock, again=again, random=noise)
 
 
 def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:

@@ -47,7 +47,20 @@ _SAFE = frozenset(
             "experimenter_knows",
             "provenance",
         ),
-        *("trial", "settings", "motion", "method", "question", "event", "state", "because", "flag", "by", "ended_by", "mark"),
+        *(
+            "trial",
+            "settings",
+            "motion",
+            "method",
+            "question",
+            "event",
+            "state",
+            "because",
+            "flag",
+            "by",
+            "ended_by",
+            "mark",
+        ),
     ]
 )
 """Keys whose values are words of the design, of the program or of the gun, or are written anew."""

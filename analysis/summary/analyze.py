@@ -19,6 +19,7 @@ from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, Tell, unseen, untold
 from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
+from analysis.summary.delivered import delivered_courses
 from analysis.summary.deviations import AnalysisFiles, deviations, frozen_tests
 from analysis.summary.participation import exclusion_lines, participation
 from analysis.summary.request_data import answers_to, frozen_answer
@@ -275,6 +276,7 @@ def _told(one: _Analysed) -> ReportData:
         planned=not one.logs.mapped,
         members=dict(registered),
         analysed=who_is_analysed(one.statistics, one.logs),
+        delivered=() if one.logs.mapped else delivered_courses(one.logs.files),
     )
 
 

@@ -55,14 +55,14 @@ def drill_of(rest: str) -> SensorDrill:
 
 
 class SimulatedSensor:
-    """Measures by the model; `seed` is that of its noise."""
+    """Measures by the model; its noise, and where its samples lie, come from `random`."""
 
     immediate = True
 
-    def __init__(self, address: str, seed: int) -> None:
+    def __init__(self, address: str, random: np.random.Generator) -> None:
         self.address = address
         self._drill = drill_of(address.partition(":")[2])
-        self._random, self._shots = np.random.default_rng(seed), 0
+        self._random, self._shots = random, 0
         self._courses: dict[Method, Vector] = {}
         self._fine = np.arange(-BEFORE_S, _LONG_S, FINE_S)
 

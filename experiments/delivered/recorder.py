@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from device import Gun, GunStatus, Shot, ShotReport
 from device.methods import Method
 from device.parameters import GunParameters
@@ -45,7 +47,7 @@ class ShotFired:
 
 @contextmanager
 def open_recorder(
-    address: str, gun: str, methods: Mapping[str, Method], clock: Clock, *, again: bool, seed: int
+    address: str, gun: str, methods: Mapping[str, Method], clock: Clock, *, again: bool, random: np.random.Generator
 ) -> Iterator[ShotRecorder]:
     """The recorder of a run. `SensorError`: the sensor is refused, or can measure no such gun on no such clock."""
     simulated = address.partition(":")[0] == "simulated"
@@ -57,7 +59,7 @@ def open_recorder(
             "and a gun that takes its time, or --sensor simulated"
         )
     try:
-        end: SensorEnd = SimulatedSensor(address, seed) if simulated else SensorLink(address)
+        end: SensorEnd = SimulatedSensor(address, random) if simulated else SensorLink(address)
     except SensorError as error:
         raise SensorError(f"--sensor {error}") from error
     recorder = ShotRecorder(end, methods, beside=clock.name != "virtual", again=again)

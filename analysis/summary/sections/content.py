@@ -11,6 +11,7 @@ from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.report.figures.shot import ShotPanel
 from analysis.report.section import Section
+from analysis.summary.delivered import DeliveredCourse
 from analysis.summary.results import StudyStatistics, WithinStatistics
 from experiments.study.study import Member
 
@@ -33,6 +34,7 @@ class ReportData:
     published numbers. `planned`: the logs come with their plans, as those of other programs do not. `members` is what
     the register says of people, `analysed` by experiment whose answers count. `apart`: the same of data of other kinds,
     which are kept apart. `rated_from`: the ends of the scale of other programs' ratings, which became 0 and 10.
+    `delivered`: what sensors measured of the shots.
     """
 
     title: str
@@ -54,6 +56,7 @@ class ReportData:
     members: Mapping[str, Member] = field(default_factory=dict)
     analysed: Mapping[str, Sequence[str]] = field(default_factory=dict)
     apart: tuple[ReportData, ...] = ()
+    delivered: tuple[DeliveredCourse, ...] = ()
 
 
 _SPELLED_OUT = 4

@@ -10,6 +10,7 @@ from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
+from analysis.summary.figures.delivered import figure_delivered
 from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.pairs import figure_pairs, has_scores
@@ -24,6 +25,7 @@ from analysis.summary.figures.trade import (
 )
 from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
+from analysis.summary.sections.delivered import DELIVERED_FIGURE
 from analysis.times.own_trials import TimeSpread
 from experiments.record.tables import is_rated
 
@@ -42,16 +44,12 @@ def write_figures(folder: Path, report: ReportData) -> None:
     if statistics.analysed:
         figure_8(statistics, folder / _RESULTS_FIGURE)
     if direction is not None and direction.n:
-        figure_directions(direction, folder / _DIRECTIONS_FIGURE)
-        if direction.response_times.n:
-            figure_response_times(direction, folder / _TIMES_FIGURE)
-        if has_curve(direction):
-            figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
-        if has_points(direction):
-            figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
+        _write_direction(folder, direction)
     for name, one in statistics.designs.items():
         _write_design(folder, name, one)
         _write_models(folder, name, one)
+    if report.delivered:
+        figure_delivered(report.delivered, folder / DELIVERED_FIGURE)
     if report.panels:
         figure_5(report.panels, folder / _SHOT_FIGURE)
 
@@ -59,6 +57,16 @@ def write_figures(folder: Path, report: ReportData) -> None:
 def _write_design(folder: Path, name: str, design: DesignSummary) -> None:
     if any(question.drawn for question in design.questions.values()):
         figure_design(design, folder / figure_of(name))
+
+
+def _write_direction(folder: Path, direction: DirectionStatistics) -> None:
+    figure_directions(direction, folder / _DIRECTIONS_FIGURE)
+    if direction.response_times.n:
+        figure_response_times(direction, folder / _TIMES_FIGURE)
+    if has_curve(direction):
+        figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
+    if has_points(direction):
+        figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
 
 
 def _write_models(folder: Path, name: str, design: DesignSummary) -> None:

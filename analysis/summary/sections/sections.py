@@ -14,6 +14,7 @@ from analysis.report.section import PageHead, PageNotice, Section, Table, names_
 from analysis.report.serial import as_json
 from analysis.report.terminal import Tell, untold
 from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.delivered import delivered_section
 from analysis.summary.sections.designs import sections_of_designs
 from analysis.summary.sections.experiments import direction_section, everybodys_values, preference_section
 from analysis.summary.sections.glance import glance_section
@@ -86,6 +87,7 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     _finished,
     manuscript_section,
     quality_section,
+    delivered_section,
     supplement_sections,
     requested_sections,
     trade_sections,

@@ -1,0 +1,87 @@
+"""Shots of a held gun as a sensor sees them, from the physics and noise, through measuring and marking."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from device.methods import Method, paper_methods
+from device.parameters import GunParameters
+from device.physics.hand import HandMechanics
+from device.sensor.expected import FINE_S, expected_shot, modelled_acceleration
+from device.sensor.measuring import BEFORE_S, DeliveredShot, SensorTrace, measured
+from experiments.delivered.marks import FRICTION_SPREAD, PEAK_SPREAD, DeliveryLevel, after_shot
+
+RATE_HZ = 3200.0
+NOISE_M_S2 = 0.1
+LONG_S = 0.15
+FINE = np.arange(-BEFORE_S, LONG_S, FINE_S)
+DAMPED = paper_methods()["asymmetric-2"]
+"""The paper's method with a damper."""
+
+
+def slipped(actuator: Method, part: float) -> Method:
+    """The same gun whose friction fell by a part."""
+    assert isinstance(actuator, GunParameters)
+    return replace(actuator, friction_N=actuator.friction_N * (1 - part))
+
+
+def course(actuator: Method, hand: HandMechanics | None = None) -> np.ndarray:
+    """The acceleration at fine steps."""
+    return modelled_acceleration(actuator, FINE, hand)
+
+
+def seen(of: np.ndarray, random: np.random.Generator, noise: float = NOISE_M_S2) -> SensorTrace:
+    """A course as a sensor samples it, at any place, with noise and gravity."""
+    times = np.arange(random.uniform() / RATE_HZ - BEFORE_S, LONG_S, 1 / RATE_HZ)
+    values = np.interp(times, FINE, of) + noise * random.standard_normal(len(times)) + 3.0
+    return SensorTrace(time_s=times, acceleration_m_s2=values)
+
+
+def measured_shot(of: np.ndarray, random: np.random.Generator, noise: float = NOISE_M_S2) -> DeliveredShot:
+    """What is measured of a course; there must be something."""
+    expected = expected_shot(DAMPED, RATE_HZ)
+    assert expected is not None
+    found = measured(seen(of, random, noise), 0.0, expected)
+    assert found is not None
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """What one shot came to, as parts of what is expected, with their uncertainties."""
+
+    peak: tuple[float, float]
+    friction: tuple[float, float]
+
+
+def parts_of(found: DeliveredShot) -> Parts:
+    expected = expected_shot(DAMPED, RATE_HZ)
+    assert expected is not None
+    assert expected.friction_N is not None
+    friction = (found.friction_N or np.nan) / expected.friction_N, (found.friction_u_N or 0.0) / expected.friction_N
+    peak = found.peak_m_s2 / expected.peak_m_s2, found.peak_u_m_s2 / expected.peak_m_s2
+    return Parts(peak=peak, friction=friction)
+
+
+def marks_of(shots: Sequence[Parts]) -> list[str]:
+    """The mark of each shot of a run, by peak and friction together; empty for none."""
+    peak, friction, found = DeliveryLevel.before(PEAK_SPREAD), DeliveryLevel.before(FRICTION_SPREAD), []
+    for one in shots:
+        peak, of_peak = after_shot(peak, *one.peak)
+        friction, of_friction = after_shot(friction, *one.friction)
+        found.append(of_peak or of_friction)
+    return found
+
+
+def people(count: int, each: int, random: np.random.Generator) -> list[list[HandMechanics]]:
+    """Hands of so many people, each several times: people differ by a quarter, a person's grip by a tenth (SD)."""
+    usual = HandMechanics()
+
+    def hand(of: HandMechanics, spread: float) -> HandMechanics:
+        firm, soft = np.exp(spread * random.standard_normal(2))
+        return HandMechanics(stiffness_N_m=of.stiffness_N_m * firm, damping_N_s_m=of.damping_N_s_m * soft)
+
+    return [[hand(person, 0.1) for _ in range(each)] for person in (hand(usual, 0.25) for _ in range(count))]
