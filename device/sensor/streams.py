@@ -45,12 +45,14 @@ class SensorClock:
         self._clock = clock
         self._offset_s, self._at_s = math.inf, -math.inf
 
-    def host_s(self, sensor_s: float) -> float:
-        """When, on this machine's clock, a sample was measured that came just now."""
+    def host_times(self, sensor_s: Sequence[float]) -> list[float]:
+        """When, on this machine's clock, samples were measured that all came just now, in order."""
+        if not sensor_s:
+            return []
         now_s = self._clock()
         grown_s = self._offset_s + DRIFT * (now_s - self._at_s) if math.isfinite(self._offset_s) else math.inf
-        self._offset_s, self._at_s = min(grown_s, now_s - sensor_s), now_s
-        return sensor_s + self._offset_s
+        self._offset_s, self._at_s = min(grown_s, now_s - sensor_s[-1]), now_s
+        return [one + self._offset_s for one in sensor_s]
 
 
 class CsvSensor:
@@ -77,9 +79,10 @@ class CsvSensor:
         except OSError as error:
             raise SensorError(f"cannot be read any more ({error.strerror})") from error
         *lines, self._rest = (self._rest + data).split(b"\n")
-        return list(self._samples(lines))
+        found = list(self._numbers(lines))
+        return list(zip(self._clock.host_times([one for one, _ in found]), (value for _, value in found), strict=True))
 
-    def _samples(self, lines: list[bytes]) -> Iterator[Sample]:
+    def _numbers(self, lines: list[bytes]) -> Iterator[tuple[float, float]]:
         for line in filter(None, map(bytes.strip, lines)):
             try:
                 time_s, acceleration = map(float, line.split(b","))
@@ -89,7 +92,7 @@ class CsvSensor:
                 shown = line[:60].decode(errors="replace")
                 raise SensorError(f"{shown!r} is no line `time_s,acceleration_m_s2`") from error
             self._begun = True
-            yield self._clock.host_s(time_s), acceleration
+            yield time_s, acceleration
 
     def close(self) -> None:
         """Close the file."""
