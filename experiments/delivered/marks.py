@@ -73,7 +73,7 @@ def after_shot(level: DeliveryLevel, part: float, part_u: float) -> tuple[Delive
     up = max(0.0, level.up + change * z - change**2 / 2)
     down = max(0.0, level.down - change * z - change**2 / 2)
     if abs(z) > Z_LIMIT or max(up, down) >= SUM_LIMIT:
-        mark: DeliveryMark = "slipped" if max(up, down) >= SUM_LIMIT else "outside"
+        mark: DeliveryMark = "outside" if abs(z) > Z_LIMIT else "slipped"
         return replace(level, up=0.0, down=0.0), mark
     gain = level.variance / (level.variance + shot_variance)
     return replace(

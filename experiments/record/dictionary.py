@@ -8,6 +8,7 @@ from pathlib import Path
 
 from experiments.design.config import DesignConfig
 from experiments.record import design_table
+from experiments.record.shots_table import SHOTS
 from experiments.record.tables import FILE_SUFFIX, TABLES, Column
 
 _PAGE = Path(__file__).with_name("dictionary.md")
@@ -17,6 +18,7 @@ _PAGE = Path(__file__).with_name("dictionary.md")
 def dictionary() -> str:
     """The data dictionary as Markdown."""
     names = {f"sub-<ID>_task-{experiment}_{FILE_SUFFIX[experiment]}.csv": TABLES[experiment] for experiment in TABLES}
+    names["sub-<ID>_task-<experiment>_shots.csv"] = SHOTS
     tables = "\n".join(line for name, columns in names.items() for line in _table(name, columns))
     return _PAGE.read_text(encoding="utf-8").replace("{tables}", tables)
 
