@@ -96,8 +96,8 @@ FLAGS = text_column(
     "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
     "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), `clock-set-back` (the "
     "computer's date and time went back since the trial before), `at-edge` (a procedure chose the end of its levels, "
-    "and may have gone on), `track-over` (not presented: the track had ended), `not-delivered` (a sensor says so of the "
-    "last presentation), and the experimenter's own",
+    "and may have gone on), `track-over` (not presented: the track had ended), `not-delivered` (a sensor says so of "
+    "the last presentation), and the experimenter's own",
 )
 NOTE = text_column("note", "the experimenter's note")
 ONSET = text_column(
