@@ -25,6 +25,8 @@ from experiments.screens.synthetic import synthetic_screen
 from recoil.config_files import new_study
 from tests import figure_files, warm_start, watched_start
 from tests.at_display import AtConsole, AtDisplay, virtual_display
+from tests.pseudo_languages import LONG, RIGHT_TO_LEFT, write_pseudo_languages
+from tests.shown_languages import opened_in
 
 OUT = Path(__file__).parent / "pictures"
 ROOT = Path(__file__).parent.parent
@@ -229,6 +231,18 @@ def threshold(folder: Path, display: str) -> None:
     keep(Image.open(drawn), "figure-threshold-tracks", 1000)
 
 
+# languages
+
+
+def languages(folder: Path, display: str) -> None:
+    """The participant's pages in Chinese and in both languages of the tests."""
+    own = write_pseudo_languages(folder)
+    for code in ("zh", LONG, RIGHT_TO_LEFT):
+        with opened_in(code, own, display) as pages:
+            for name, image in pages.pictures():
+                keep(image, f"language-{code}-{name}", 640)
+
+
 # figures
 
 
@@ -263,6 +277,7 @@ def main() -> None:
         "lab_day": lab_day,
         "ratings": ratings,
         "threshold": threshold,
+        "languages": languages,
         "figures": figures,
     }
     OUT.mkdir(exist_ok=True)

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from device import Gun, open_gun
+from experiments.catalogues.catalogue import ENGLISH, Language
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of, practice_of
+from experiments.design.shown_texts import setup_in
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import checked_seed, draw_seed, generator
 from experiments.live_run import LiveRun, RunStopped, Screen
@@ -88,7 +90,7 @@ class RunRequest:
     it. A `practice` is not analysed: it has files of its own and can be done again; nothing of a `training` is kept.
     `anew_reason` is why an unfinished run is set aside for a fresh one: for the register and the head of the new
     journal. At the console the participant may have `options` of their own, and a `visual` run is worked by a
-    synthetic one.
+    synthetic one. `language` is the participant's.
     """
 
     setup: Setup[DesignConfig]
@@ -104,6 +106,7 @@ class RunRequest:
     screen: ScreenName = "synthetic"
     visual: bool = False
     options: ParticipantOptions = ParticipantOptions()
+    language: Language = ENGLISH
 
     @property
     def simulated(self) -> bool:
@@ -140,6 +143,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     """Carry out a run. `PlaceError`, `JournalError`, `ConfigError`, `RunStopped`: nothing acknowledged is ever lost."""
     setup = request.setup
     check_limits(setup)
+    shown, _ = setup_in(request.language, setup)
     stimuli = stimuli_of(setup.config, setup.gun)
     registered = register.read_register(request.results)
     place = folders.place(request.results, request.participant_id, setup.config.experiment, registered)
@@ -153,7 +157,8 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
         stimuli.work_out(plan.trials)
         told: GrowingHistory = []
-        session, screen = design_session(plan, setup, told), make_screen(setup, plan, clock)
+        session = design_session(plan, shown, told, request.language.messages)
+        screen = make_screen(shown, plan, clock)
         with _open_sensor(request, plan, stimuli, clock) as recorder, _open(place, before, clock) as journal:
             head = _circumstances(request, gun, clock)
             if before is None:
@@ -282,9 +287,38 @@ def _plan_of(before: Contents, request: RunRequest) -> Plan:
             f"{before.path}: the run began with other synthetic people than {request.setup.config.synthetic} has now; "
             f"resume with those it began with, whom {given_back} gives back, or start anew (--fresh)"
         )
+    _check_same_language(before, request)
     if request.seed is not None and request.seed != plan.seed:
         raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
     return plan
+
+
+def _language_record(request: RunRequest) -> dict[str, object]:
+    """What the head of a journal says of the participant's language: nothing where it is English alone."""
+    words, one = _words_shown(request), request.language
+    if words is None:
+        return {}
+    named = {"code": one.code, "name": one.name, "checked_by": one.checked_by}
+    return {"language": {**named, "messages": words[0], "texts": words[1]}}
+
+
+def _words_shown(request: RunRequest) -> tuple[dict[str, str], dict[str, str]] | None:
+    """The messages of a run, and what it shows for the texts of its design; `None` where it is English alone."""
+    _, texts = setup_in(request.language, request.setup)
+    return None if request.language is ENGLISH else (asdict(request.language.messages), texts)
+
+
+def _check_same_language(before: Contents, request: RunRequest) -> None:
+    """`PlaceError` if the run began in another language, or in other words of it: it was shown so up to here."""
+    began, now = before.head.language, request.language
+    code = ENGLISH.code if began is None else began.code
+    if code != now.code:
+        raise PlaceError(f"{before.path}: the run began in {code}, not in {now.code}; resume with --language {code}")
+    if _words_shown(request) != (None if began is None else (began.messages, began.texts)):
+        raise PlaceError(
+            f"{before.path}: the run began with another catalogue {code} than there is now; resume with the one it "
+            "began with (--catalogues DIR), or start anew (--fresh)"
+        )
 
 
 def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:
@@ -327,7 +361,7 @@ def _begin(
     """Write the head of a new journal, and the first step."""
     setup, why = request.setup, {"set_aside_reason": request.anew_reason} if request.anew_reason else {}
     laws = {} if setup.laws is None else {"laws": setup.laws.model_dump(mode="json")}
-    who = {"participant": request.participant_kind}
+    who = {"participant": request.participant_kind, **_language_record(request)}
     plan_head = {"plan": plan.record(), "plan_sha256": plan.sha256(), **who, **why, **laws}
     journal.append("run", **plan_head, setup=setup.record(), setup_sha256=setup.sha256(), **head)
     step = next(session)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from device.serial_gun.gun import speed_of
 from device.words import few_of_each
+from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.design.shown_texts import letters_of
 from experiments.live_run import RunStopped, Screen
 from experiments.rebuild import rebuild, shots_table
 from experiments.record import replay, storage
@@ -28,7 +30,27 @@ from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
 
 
-def run_session(request: RunRequest) -> Place:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LanguageOptions:
+    """Which language was asked for, if any, where else there are catalogues, and whether one may be unchecked."""
+
+    code: str | None = None
+    folder: Path | None = None
+    unchecked: bool = False
+
+    def language(self, code: str) -> Language:
+        """A language that may be used. `ConfigError`: there is none, or nobody has checked it."""
+        found = language(code, self.folder)
+        check_allowed(found, unchecked=self.unchecked)
+        return found
+
+    def usable(self) -> tuple[Language, ...]:
+        """Every language that may be used."""
+        found = (language(code, self.folder) for code in languages(self.folder))
+        return tuple(one for one in found if one.checked_by or self.unchecked)
+
+
+def run_session(request: RunRequest, wanted: LanguageOptions = LanguageOptions()) -> Place:
     """Carry out a run. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
     check_code(request.participant_id)
     _check_screen(request)
@@ -37,6 +59,8 @@ def run_session(request: RunRequest) -> Place:
         raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
         _check_resumable(request)
+    request = replace(request, language=wanted.language(wanted.code or _began_in(request)))
+    _check_terminal(request)
     _say_beforehand(request)
     try:
         return _SCREENS[request.screen](request).place
@@ -100,6 +124,30 @@ def _check_same_kind(request: RunRequest, where: Place) -> None:
         )
 
 
+def _began_in(request: RunRequest) -> str:
+    """The language of a run that nobody names: that which it began in, else that of its design."""
+    contents = None
+    if request.again == "resume":
+        contents = begun(place(request.results, request.participant_id, request.setup.config.experiment).journal)
+    if contents is None:
+        return request.setup.config.language
+    return ENGLISH.code if contents.head.language is None else contents.head.language.code
+
+
+def _check_terminal(request: RunRequest) -> None:
+    """`PlaceError` if a terminal cannot write what is to be read out: it would put a question mark for each letter."""
+    if request.screen != "terminal" or request.language is ENGLISH:
+        return
+    encoding = sys.stdout.encoding
+    try:
+        letters_of(request.language, request.setup).encode(encoding)
+    except UnicodeEncodeError as error:
+        raise PlaceError(
+            f"--language {request.language.code}: this terminal writes {encoding}, which has no "
+            f"{error.object[error.start]!r}; set it to UTF-8 (LANG=C.UTF-8), or use --screen console"
+        ) from error
+
+
 def _check_screen(request: RunRequest) -> None:
     if request.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
@@ -121,7 +169,8 @@ def check_pace(screen: str, gun: str) -> None:
 
 def _at_terminal(request: RunRequest) -> Finished:
     def screen(_: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
-        return TerminalScreen(plan, clock, simulated=request.gun == "simulated")
+        messages = request.language.messages
+        return TerminalScreen(plan, clock, simulated=request.gun == "simulated", messages=messages)
 
     return run(request, screen, RealClock())
 
@@ -152,7 +201,7 @@ _SCREENS: dict[ScreenName, Callable[[RunRequest], Finished]] = {
 }
 
 
-def run_lab_day(request: RunRequest) -> None:
+def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()) -> None:
     """The start window at the console, and one run after the other from it; `request` is without a participant."""
     if request.screen != "console":
         code = "S01, or another code of a synthetic participant" if request.screen == "synthetic" else "CODE"
@@ -162,11 +211,12 @@ def run_lab_day(request: RunRequest) -> None:
             "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"
         )
     check_pace("console", request.gun)
+    request = replace(request, language=wanted.language(wanted.code or request.setup.config.language))
     _say_beforehand(request)
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
     try:
-        live.lab_day(request)
+        live.lab_day(request, wanted.usable())
     except KeyboardInterrupt as signalled:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
             sys.stderr.write(f"recoil: ended by {signalled}\n")

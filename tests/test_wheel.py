@@ -40,6 +40,9 @@ def test_the_wheel_holds_the_four_packages_and_the_configs_and_nothing_else(whee
         "experiments/shipped_configs/schemas/design.json",
         "analysis/report/templates/report.html.j2",
         "experiments/screens/console/console.qss",
+        "experiments/catalogues/recoil.pot",
+        "experiments/catalogues/zh/LC_MESSAGES/recoil.po",
+        "experiments/catalogues/zh/LC_MESSAGES/recoil.mo",
     ):
         assert name in names
     assert any(name.endswith(".dist-info/licenses/LICENSE") for name in names)
@@ -60,6 +63,6 @@ def test_installed_elsewhere_recoil_works_from_any_folder(wheel: Path, tmp_path:
         )
 
     assert str(site) in recoil("configs").stdout
-    recoil("run", "preference", "--participant", "P01", "--screen", "synthetic")
+    recoil("run", "preference", "--participant", "P01", "--screen", "synthetic", "--language", "zh", "--unchecked")
     recoil("analyze", "results", "--out", "analysis")
     assert (elsewhere / "analysis" / "report.html").exists()

@@ -21,11 +21,13 @@ CODE = r"[A-Za-z0-9]{1,32}"
 """A participant's code, as a pattern."""
 DESIGN_NAME, COLUMN_NAME = r"^[a-z]{1,32}$", r"^[A-Za-z][A-Za-z0-9_]{0,31}$"
 OWN_KEY, CODE_PREFIX = r"^[a-z0-9]$|^(left|right|up|down)$", r"^[A-Za-z0-9]{1,29}$"
+LANGUAGE_CODE = r"^[A-Za-z]{2,8}([_-][A-Za-z0-9]{1,8})*$"
 PATTERNS: Mapping[str, str] = {
     DESIGN_NAME: "1 to 32 letters a to z and nothing else",
     COLUMN_NAME: "a letter and up to 31 letters, digits or _ (a to z, A to Z)",
     OWN_KEY: "a letter a to z, a digit, left, right, up or down",
     CODE_PREFIX: "1 to 29 letters and digits (a to z, A to Z)",
+    LANGUAGE_CODE: "a language's code, such as zh or pt-BR",
     f"^{CODE}$": "1 to 32 letters and digits (a to z, A to Z)",
     r"^[A-Za-z0-9_-]{1,40}$": "1 to 40 letters, digits, _ or - (a to z, A to Z)",
     r"^[a-z][a-z0-9-]{0,31}$": "a letter and up to 31 letters, digits or - (a to z)",

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from device.words import Direction
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
-from experiments.config.findings import DESIGN_NAME
+from experiments.config.findings import DESIGN_NAME, LANGUAGE_CODE
 from experiments.config.lines import LineText
 from experiments.design.language import (
     DIRECTION_FACTOR,
@@ -38,12 +38,17 @@ from experiments.design.procedure_problems import procedure_problems
 from experiments.design.procedures.config import AdaptiveConfig, ConstantConfig, PairingConfig, ProcedureConfig
 
 
+def _is_english(code: str) -> bool:
+    return code == "en"
+
+
 class DesignConfig(Model):
-    """A design: `docs/design-language.md`."""
+    """A design: `docs/design-language.md`. `language` is that of its texts, in no record where it is English."""
 
     design: Annotated[str, Field(pattern=DESIGN_NAME)]
     title: LineText
     gun: Text
+    language: Annotated[str, Field(pattern=LANGUAGE_CODE, exclude_if=_is_english)] = "en"
     synthetic: Text | None = None
     table: Literal["trials", "ratings"] = "trials"
     below_break_away: bool = False

@@ -65,11 +65,26 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ShownLanguage:
+    """The language of a run that was not in English: its messages, and what it has for the design's texts.
+
+    `checked_by` is empty where no native speaker has checked the catalogue.
+    """
+
+    code: str
+    name: str
+    checked_by: str
+    messages: dict[str, str]
+    texts: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Head(Record):
     """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes.
 
     `laws_json`: how synthetic people answer the design, `None` where nothing says so. `participant`: who was to do it.
-    `preregistration_sha256` is empty where the study was not frozen. `provenance`: versions, commit and system.
+    `preregistration_sha256` is empty where the study was not frozen. `language`: `None` is
+    English. `provenance`: versions, commit and system.
     """
 
     path: Path
@@ -81,6 +96,7 @@ class Head(Record):
     participant: ParticipantKind = "person"
     gun: Identity | None = None
     preregistration_sha256: str = ""
+    language: ShownLanguage | None = None
     provenance: dict[str, str] = field(default_factory=dict)
 
     @property

@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 from device import GunStatus
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
 from experiments.screens import texts
@@ -55,8 +56,9 @@ class TerminalScreen:
         out: TextIO | None = None,
         *,
         simulated: bool = False,
+        messages: ParticipantMessages = ENGLISH_MESSAGES,
     ) -> None:
-        self._plan, self._clock, self._simulated = plan, clock, simulated
+        self._plan, self._clock, self._simulated, self._messages = plan, clock, simulated, messages
         self._out = out or sys.stdout
         if isinstance(sys.stdin, io.TextIOWrapper):
             sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
@@ -122,13 +124,16 @@ class TerminalScreen:
             case State.TRAIN if position.onset_s is not None:
                 return "\n  Enter when the participant says next: "
             case State.ASKING if isinstance(step, Ask):
-                about = f"{texts.ordinal(self._plan, step.trial)}. " if step.later else self._level(step)
+                about = (
+                    f"{texts.ordinal(self._plan, step.trial, self._messages)}. " if step.later else self._level(step)
+                )
                 return f"\n  {about}{step.text} {_keys(step)}: "
             case State.RATING if isinstance(step, Rate):
                 none = "; `none` for no answer" if step.may_be_skipped else ""
-                return f"\n{texts.about_text(self._plan, step)}. {step.text}\n  {texts.ends_text(step)}{none}: "
+                about = texts.about_text(self._plan, step, self._messages)
+                return f"\n{about}. {step.text}\n  {texts.ends_text(step)}{none}: "
             case State.DESCRIBING if isinstance(step, Describe):
-                return f"\n  {texts.about_text(self._plan, step)}. {step.text} "
+                return f"\n  {texts.about_text(self._plan, step, self._messages)}. {step.text} "
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
             case State.CLOSING:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import unicodedata
 
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.design.language import LARGEST_NUMBER, shown_level
 from experiments.design.plan import Plan, Trial
 from experiments.session import remarks, steps
@@ -18,10 +19,13 @@ from experiments.tasks.questions import AnswerValue
 FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
 
 
-def ordinal(plan: Plan, trial: Trial) -> str:
-    """How a stimulus is named that is rated after all were felt: by its order, not by its method."""
+def ordinal(plan: Plan, trial: Trial, messages: ParticipantMessages = ENGLISH_MESSAGES) -> str:
+    """How a stimulus is named that is rated after all were felt: by its order, not by its method.
+
+    Where it is read out, by the participant's `messages`.
+    """
     number, of = place_in_set(plan, trial)
-    return f"Feedback {number} of {of}"
+    return messages.place.format(number=number, of=of)
 
 
 def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
@@ -123,9 +127,9 @@ _TINY = 1e-6
 """A least number as small as this says that 0 is none."""
 
 
-def about_text(plan: Plan, asked: Asking) -> str:
+def about_text(plan: Plan, asked: Asking, messages: ParticipantMessages = ENGLISH_MESSAGES) -> str:
     """What was asked about: the trial, or a stimulus by its order of presentation."""
-    return ordinal(plan, asked.trial) if asked.later else f"Trial {asked.trial.trial}"
+    return ordinal(plan, asked.trial, messages) if asked.later else f"Trial {asked.trial.trial}"
 
 
 def entry_text(plan: Plan, told: History, entry: Asking) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from experiments.config.setup import GunConfig, Setup
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
+from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import INSTRUCTION_FACTOR, TRAIN_INTERVAL, QuestionConfig
 from experiments.design.plan import Plan, Trial
@@ -29,16 +30,19 @@ from experiments.session.steps import (
 from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import choices, correct_columns, right_answer
 
-RIGHT, WRONG = "That was right.", "That was wrong."
-"""What the participant is told after an answer, where the design says so."""
 
-
-def design_session(plan: Plan, setup: Setup[DesignConfig], told: History = ()) -> Session:
+def design_session(
+    plan: Plan,
+    setup: Setup[DesignConfig],
+    told: History = (),
+    messages: ParticipantMessages = ENGLISH_MESSAGES,
+) -> Session:
     """The steps of a run of a design, from what is told first to its end. A practice is told nothing first.
 
-    `told` is what was done so far, and grows: levels that follow from the answers so far are chosen by it.
+    `told` is what was done so far, and grows: levels that follow from the answers so far are chosen by it. `messages`
+    are in the participant's language, as the texts of the setup's design are.
     """
-    script = _Script(setup.config, setup.gun, plan, told)
+    script = _Script(setup, plan, told, messages)
     presenter = Presenter(script.presentation)
     if not plan.practice:
         for opening in setup.config.opening:
@@ -95,8 +99,9 @@ def _rest(presenter: Presenter, design: DesignConfig, before: Trial, trial: Tria
 class _Script:
     """What the steps of a design's trials are, all of them made before the first but for levels that are chosen."""
 
-    def __init__(self, design: DesignConfig, gun: GunConfig, plan: Plan, told: History) -> None:
-        self.design, self.gun, self.plan = design, gun, plan
+    def __init__(self, setup: Setup[DesignConfig], plan: Plan, told: History, messages: ParticipantMessages) -> None:
+        design = setup.config
+        self.design, self.gun, self.plan, self._messages = design, setup.gun, plan, messages
         self._stimuli = {trial: tuple(self._intervals(trial)) for trial in plan.trials}
         self._asked = {
             (trial, when): tuple(self._questions(trial, when)) for trial in plan.trials for when in ("trial", "block")
@@ -155,7 +160,8 @@ class _Script:
         felt = self._tracks.as_felt(trial) if self._tracks is not None else trial
         right = right_answer(self.design, self.design.questions[self._scored], felt)
         if right is not None:
-            text = RIGHT if presenter.said[trial, self._scored] == right else WRONG
+            is_right = presenter.said[trial, self._scored] == right
+            text = self._messages.right if is_right else self._messages.wrong
             yield Inform(text=text, what="feedback", trial=trial)
 
     def _intervals(self, trial: Trial) -> Iterator[Prepare | FireShot | Present]:

@@ -64,6 +64,15 @@ MonitorOption = Annotated[
 LslOption = Annotated[
     bool, typer.Option("--lsl", help="Each shot, answer, pause and fault to Lab Streaming Layer (`recoil markers`).")
 ]
+LanguageOption = Annotated[
+    str | None, typer.Option(metavar="CODE", help="The participant's language; without: the design's, English.")
+]
+CataloguesOption = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="A folder with catalogues of your own, before those that come along.")
+]
+UncheckedOption = Annotated[
+    bool, typer.Option("--unchecked", help="Also a language that no native speaker has checked.")
+]
 
 
 def run(
@@ -84,6 +93,9 @@ def run(
     noise: NoiseOption = False,
     participant_monitor: MonitorOption = None,
     lsl: LslOption = False,
+    language: LanguageOption = None,
+    catalogues: CataloguesOption = None,
+    unchecked: UncheckedOption = False,
     as_json: AsJsonOption = False,
 ) -> None:
     """One run: a participant doing one experiment."""
@@ -107,11 +119,12 @@ def run(
             screen=participant_screen, keys=participant_keys, noise=noise, monitor=participant_monitor
         ),
     )
+    wanted = session.LanguageOptions(code=language, folder=catalogues, unchecked=unchecked)
     with session.with_markers(request, wanted=lsl):
         if participant is None:
-            session.run_lab_day(request)
+            session.run_lab_day(request, wanted)
             return
-        done = session.run_session(request)
+        done = session.run_session(request, wanted)
     show({"journal": str(done.journal), "table": str(done.table)}, f"Done: {done.table}", as_json)
 
 

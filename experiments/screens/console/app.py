@@ -221,6 +221,7 @@ class Console:
             simulated=self._request.gun == "simulated",
             participant_rates=self.participant is not None and self.participant.rates,
             participant_keys=self.participant is not None and self.participant.own_keys,
+            messages=self._request.language.messages,
         )
         self._bridge.opening.emit(about)
         self._opened.wait()

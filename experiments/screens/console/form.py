@@ -10,6 +10,7 @@ from PyQt6 import QtWidgets
 from PyQt6.QtCore import Qt, pyqtSignal
 from PyQt6.QtGui import QGuiApplication, QScreen
 
+from experiments.catalogues.catalogue import ENGLISH, Language
 from experiments.config.door import Fact, Handedness, Sex
 from experiments.run import ParticipantOptions
 from experiments.screens.console import widgets
@@ -31,8 +32,11 @@ class Form(QtWidgets.QFrame):
     code_edited = pyqtSignal()
     experiment_edited = pyqtSignal()
 
-    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], options: ParticipantOptions) -> None:
+    def __init__(self, experiments: Sequence[str], asked: Sequence[Fact], opening: Opening) -> None:
         super().__init__()
+        self._languages = opening.languages
+        self.languages = ListBox([one.title for one in self._languages])
+        self.languages.setCurrentIndex([one.code for one in self._languages].index(opening.language))
         self.setObjectName("panel")
         self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
         self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
@@ -40,7 +44,7 @@ class Form(QtWidgets.QFrame):
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
         self.remark = TextLines("remark")
         self._typed: dict[str, str] | None = None
-        self._tick(options)
+        self._tick(opening.options)
         self._lay_out()
         self._connect()
 
@@ -66,13 +70,14 @@ class Form(QtWidgets.QFrame):
         rows += [("Code, read back", self.code_again)]
         rows += [(_FACT_TEXT[fact], widget) for fact, widget in self.facts.items()]
         rows += [("Participant", self.own_screen), ("", self.own_keys), ("", self.noise)]
+        rows += [("Their language", self.languages)] if len(self._languages) > 1 else []
         return rows + ([("Their monitor", self.monitor)] if self.monitor.count() > 1 else [])
 
     def _connect(self) -> None:
         for line in (self.code, self.code_again, *self.facts.values()):
             if isinstance(line, LineEdit):
                 line.textChanged.connect(self.edited)
-        for box in (self.experiment, self.monitor, *self.facts.values()):
+        for box in (self.experiment, self.languages, self.monitor, *self.facts.values()):
             if isinstance(box, ListBox):
                 box.currentIndexChanged.connect(self.edited)
         for tick in (self.own_screen, self.own_keys, self.noise):
@@ -91,6 +96,11 @@ class Form(QtWidgets.QFrame):
     def participant_id(self) -> str:
         """The code that stands there."""
         return self.code.text().strip()
+
+    @property
+    def language(self) -> Language:
+        """The participant's language."""
+        return self._languages[self.languages.currentIndex()]
 
     def entered(self) -> Entered:
         """What stands in the fields about the participant."""
@@ -163,10 +173,13 @@ class Opening:
     """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says.
 
     `named` is the experiment whose config was named when the program was started; later windows have none.
+    `language` is the code of one of the `languages`.
     """
 
     gun: str
     named: str = ""
+    languages: tuple[Language, ...] = (ENGLISH,)
+    language: str = ENGLISH.code
     options: ParticipantOptions = field(default_factory=ParticipantOptions)
     participant_id: str = ""
     said: str = ""

@@ -18,10 +18,12 @@ from PyQt6.QtTest import QTest
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from device.words import RecoilError
+from experiments.catalogues.catalogue import Language
 from experiments.clock import RealClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition
+from experiments.design.shown_texts import setup_in
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
@@ -29,14 +31,14 @@ from experiments.run import Again, Finished, RunRequest, UnfinishedRun
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import Opening, monitors
-from experiments.screens.console.participant_link import WAIT, ParticipantSide, check_own_keys
+from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import Look, NoiseIs
+from experiments.screens.participant.messages import NoiseIs
 from experiments.screens.participant.pages import spot_px
 from experiments.screens.participant.stage import WINDOW_TITLE
 from experiments.session.history import chosen_levels
@@ -65,6 +67,7 @@ def run_live(request: RunRequest, *, band: str = "", last: str = THANK_PARTICIPA
 
 def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
     clock = RealClock()
+    check_font(request)
     with ExitStack() as stack:
         rater = _rater(stack) if request.visual and request.options.screen else None
         participant = _participant(stack, request) if request.options.any else None
@@ -74,21 +77,25 @@ def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
         return console.run()
 
 
-def lab_day(request: RunRequest) -> None:
+def lab_day(request: RunRequest, languages: tuple[Language, ...]) -> None:
     """One run after the other from the start window, until it is closed.
 
-    `request` says what all have in common, and what is ticked at first. `KeyboardInterrupt` if a signal ended it.
+    `request` says what all have in common, and what is ticked at first; `languages` which there are to choose from.
+    `KeyboardInterrupt` if a signal ended it.
     """
     application()
     check_monitor(request.options.monitor)
     study, named = study_of(request), request.setup.config.experiment
-    opening = Opening(gun=request.gun, named=named, options=request.options)
+    opening = Opening(
+        gun=request.gun, named=named, options=request.options, languages=languages, language=request.language.code
+    )
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
             choice = replace(choice, sensor="" if choice.training else request.sensor)
             said = _of_the_day(request, study, choice)
             code = "" if choice.training else choice.participant_id
-            opening = Opening(gun=request.gun, options=choice.options, participant_id=code, said=said)
+            opening = replace(opening, named="", options=choice.options, language=choice.language.code)
+            opening = replace(opening, participant_id=code, said=said)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 
@@ -148,16 +155,17 @@ def study_of(request: RunRequest) -> StudyFolder:
 
 def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
-    options = request.options
+    options, said = request.options, request.language.messages
+    setup, _ = setup_in(request.language, request.setup)
     check_monitor(options.monitor)
     if options.keys:
-        check_own_keys(request.setup)
-    look = _look(options.monitor)
+        check_own_keys(setup)
+    look = look_of(request, len(QGuiApplication.screens()))
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))
         link.wait_ready()
-        link.show(WAIT)
+        link.show(said.wait)
         return link
 
     try:
@@ -167,18 +175,13 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     return ParticipantSide(
         link,
         open_link,
-        request.setup,
+        setup,
         rates=options.screen,
         own_keys=options.keys,
         noise=_noise(link) if options.noise else None,
         hand="synthetic" if request.visual else "participant",
+        said=said,
     )
-
-
-def _look(monitor: int | None) -> Look:
-    """The screen that was chosen, else the last of several, all of it; of one screen a part, to leave the console."""
-    screens = len(QGuiApplication.screens())
-    return Look(screen=screens - 1 if monitor is None else monitor, full_screen=screens > 1)
 
 
 def _noise(link: ParticipantLink) -> NoiseIs:

@@ -9,9 +9,14 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 
+from experiments.catalogues.catalogue import ENGLISH
+from experiments.catalogues.fonts import font_for
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.shown_texts import letters_of
 from experiments.live_run import LiveRun
+from experiments.run import RunRequest
 from experiments.screens.console.keys import choices_at, shared_keys
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant import messages
@@ -25,7 +30,7 @@ from experiments.session.steps import Ask, Describe, Inform, Rate, Step
 from experiments.study.folders import PlaceError
 from experiments.tasks.questions import first_choices
 
-WAIT, PAUSED, THANKS = "Please wait.", "Paused. Please wait.", "Thank you."
+WAIT, PAUSED, THANKS = ENGLISH_MESSAGES.wait, ENGLISH_MESSAGES.paused, ENGLISH_MESSAGES.thanks
 
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
@@ -47,6 +52,29 @@ def check_own_keys(setup: Setup[DesignConfig]) -> None:
             )
 
 
+def check_font(request: RunRequest) -> None:
+    """`ConfigError` if a letter of the participant's language is in none of its fonts: also the console shows texts."""
+    if request.language is not ENGLISH:
+        font_for(request.language, letters_of(request.language, request.setup))
+
+
+def look_of(request: RunRequest, screens: int) -> messages.Look:
+    """The screen that was chosen, else the last of several, all of it; of one screen a part, to leave the console.
+
+    In a font that has all letters of the participant's language. `ConfigError`: there is none.
+    """
+    monitor, language = request.options.monitor, request.language
+    font = font_for(language, letters_of(language, request.setup))
+    return messages.Look(
+        screen=screens - 1 if monitor is None else monitor,
+        full_screen=screens > 1,
+        font=font.family,
+        font_file=str(font.path or ""),
+        right_to_left=language.right_to_left,
+        messages=language.messages,
+    )
+
+
 def _has_a_page(step: Step | None) -> bool:
     """Whether something can be asked on the participant's own screen: a scale or words, not any number."""
     return isinstance(step, Describe) or (isinstance(step, Rate) and step.grain > 0)
@@ -56,6 +84,7 @@ class ParticipantSide:
     """The participant's screen. `open_link` starts its program, again if need be.
 
     `rates` and `own_keys` say what is asked there; `noise` whether masking noise is wanted; `hand` whose hand it is.
+    `setup` and `said` are in the participant's language.
     """
 
     def __init__(
@@ -68,8 +97,10 @@ class ParticipantSide:
         own_keys: bool,
         noise: messages.NoiseIs | None = None,
         hand: OwnHand = "participant",
+        said: ParticipantMessages = ENGLISH_MESSAGES,
     ) -> None:
-        self._link, self._open_link = link, open_link
+        self._link, self._open_link, self._messages = link, open_link, said
+        self._shown = {WAIT: said.wait, PAUSED: said.paused, THANKS: said.thanks, messages.BETWEEN: said.between}
         self._choices = first_choices(setup.config)
         self.rates, self.own_keys = rates, own_keys
         self.planned = 0
@@ -114,7 +145,7 @@ class ParticipantSide:
             self._shows = shows
             if isinstance(shows, str):
                 told = tuple(self._said(position)) if self.own_keys and shows == PAUSED else ()
-                self._link.show(shows, tell=told, keep_keys=shows == messages.BETWEEN)
+                self._link.show(self._shown.get(shows, shows), tell=told, keep_keys=shows == messages.BETWEEN)
             else:
                 self._link.cancel()
                 threading.Thread(target=self._ask, args=(position,), daemon=True, name="participant").start()
@@ -157,7 +188,7 @@ class ParticipantSide:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
         paused = self._live is not None and self._live.moment.paused_between(onset_s, position.since_s)
         question = messages.AskChoice(
-            question=f"{step.trial.trial}. {step.text}" if step.later else step.text,
+            question=self._numbered(step) if step.later else step.text,
             answers=tuple(
                 messages.KeyedAnswer(answer=one.answer, label=one.label, key=one.own_key) for one in step.choices
             ),
@@ -166,6 +197,9 @@ class ParticipantSide:
         )
         while wanted() and not self._keyed(question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
+
+    def _numbered(self, step: Ask) -> str:
+        return self._messages.numbered.format(number=step.trial.trial, question=step.text)
 
     def _keyed(self, question: messages.AskChoice, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""

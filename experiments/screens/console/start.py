@@ -48,7 +48,7 @@ class StartWindow(QtWidgets.QWidget):
 
     def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
-        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening.options)
+        self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening)
         self.shots = ShotPage(self._opening.gun, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = TextLines("detail"), TextLines("saved", most_lines=5)
@@ -274,6 +274,7 @@ class StartWindow(QtWidgets.QWidget):
                 training=training,
                 screen="console",
                 options=self.form.options(),
+                language=self.form.language,
             )
             self.close()
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from device import GunStatus
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
@@ -91,7 +92,7 @@ class About:
     """What does not change during a run.
 
     `band` says that it is a practice or a training; `participant_rates` and `participant_keys` what the participant
-    does on a screen of their own.
+    does on a screen of their own; `messages` are in their language, as the setup's texts are.
     """
 
     setup: Setup[DesignConfig]
@@ -101,6 +102,7 @@ class About:
     simulated: bool = False
     participant_rates: bool = False
     participant_keys: bool = False
+    messages: ParticipantMessages = ENGLISH_MESSAGES
 
     @property
     def rated_last(self) -> bool:
@@ -268,7 +270,7 @@ def _asking(seen: Seen) -> Instruction:
     own = f"Awaited: the participant's own key, {own_keys}.\n{_keys(step)} enters it for them."
     told = f"Enter what the participant says: {_keys(step)}."
     there = _asked_there(seen, own, told) if seen.about.participant_keys else told
-    about = texts.ordinal(seen.about.plan, step.trial) if step.later else ""
+    about = texts.ordinal(seen.about.plan, step.trial, seen.about.messages) if step.later else ""
     return Instruction(title=step.text, detail="\n".join(filter(None, (about, there))), mood="ask")
 
 
@@ -298,7 +300,8 @@ def _rating(seen: Seen) -> Instruction:
     kind = what(step)
     own = f"Awaited: the participant's {kind} on their own screen, or type it here."
     there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
-    title, *more = (texts.ordinal(seen.about.plan, step.trial), step.text) if step.later else (step.text,)
+    about = texts.ordinal(seen.about.plan, step.trial, seen.about.messages)
+    title, *more = (about, step.text) if step.later else (step.text,)
     return Instruction(title=title, detail="\n".join(filter(None, (*more, there))), mood="ask")
 
 

@@ -168,4 +168,4 @@ class App:
         page = self._stage.page
         if (given := page.outcome()) is not None:
             self._wire.say(given)
-            self._stage.put(MessagePage(self._stage, messages.BETWEEN), keep_keys=page.typed)
+            self._stage.put(MessagePage(self._stage, self._stage.look.messages.between), keep_keys=page.typed)

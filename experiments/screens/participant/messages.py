@@ -14,11 +14,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
+
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
-BETWEEN = "Thank you. Please wait."
+BETWEEN = ENGLISH_MESSAGES.between
 """What stands between two questions: put there by the window at once, and then by the console until it asks."""
 
 
@@ -239,7 +241,10 @@ Theme = Literal["dark", "light"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """Screen by index, full or a window of a size; dark or light; the font must hold the script of the texts."""
+    """Screen by index, full or a window of a size; dark or light; a font that has all letters of the texts.
+
+    `font_file` is empty of a font that PsychoPy brings along. `messages` are what stands there beside the questions.
+    """
 
     screen: int = 0
     full_screen: bool = True
@@ -247,6 +252,9 @@ class Look:
     height_px: int = 800
     theme: Theme = "dark"
     font: str = "Noto Sans"  # PsychoPy brings it along
+    font_file: str = ""
+    right_to_left: bool = False
+    messages: ParticipantMessages = ENGLISH_MESSAGES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,7 +47,8 @@ class ChoicePage(Page):
             x = (place + 0.5) * width - all_across / 2
             self._drawn.append(stage.panel(TextBox(x=x, y=-0.12, width=0.9 * width, height=0.4), stage.palette.panel))
             letter = TextBox(x=x, y=-0.06, width=0.8 * width, height=0.16, anchor="center")
-            self._drawn.append(stage.text(_key_text(answer.key), letter, 0.12, stage.palette.accent))
+            key = stage.look.messages.key(answer.key)
+            self._drawn.append(stage.text(key, letter, 0.12, stage.palette.accent))
             words = TextBox(x=x, y=-0.22, width=0.8 * width, height=0.12, anchor="center")
             self._drawn.append(stage.text(answer.label, words, 0.055, ink))
 
@@ -65,15 +66,6 @@ class ChoicePage(Page):
             if press.name in said:
                 return messages.ChoiceGiven(response=said[press.name], pressed_s=press.pressed_s, ask=self._asked.ask)
         return None
-
-
-def _key_text(key: str) -> str:
-    """A key as it is printed on the keyboard.
-
-    >>> _key_text("f"), _key_text("left"), _key_text("num_1")
-    ('F', 'LEFT', '1')
-    """
-    return key.removeprefix("num_").upper()
 
 
 ENTER = ("RETURN", "ENTER", "NUM_ENTER")
@@ -103,7 +95,7 @@ class Button:
 def heading(stage: Stage, asked: messages.AskRating | messages.AskDescription) -> list[Any]:
     """Which stimulus is meant, by its order of presentation, and the question."""
     width = 2 * stage.half_width
-    which = f"Feedback {asked.number} of {asked.of}"
+    which = stage.look.messages.place.format(number=asked.number, of=asked.of)
     return [
         stage.text(which, TextBox(y=0.46, width=width, height=0.07), 0.05, stage.palette.accent),
         stage.text(asked.question, TextBox(y=0.37, width=width, height=0.3), 0.045, stage.palette.ink),
@@ -143,8 +135,6 @@ def move(scale: messages.AskRating, rating: float | None, step: Move) -> float:
     return on_scale(_STEPS[step](scale, middle if rating is None else rating), scale)
 
 
-_HINT = "Click on the line or use the arrow keys, then Confirm or Enter"
-_TAKEN = "Another one has this place: each has one of its own"
 _SCALE_Y = -0.06
 _LENGTH = 0.76
 """The scale's, as a part of the page's width."""
@@ -188,9 +178,10 @@ class RatingPage(Page):
         self._dragging = self._done = False
         self._half = _LENGTH * stage.half_width
         self._slider = self._scale()
-        self._button = Button(stage, "Confirm")
+        said = stage.look.messages
+        self._button = Button(stage, said.confirm)
         self._drawn = [*heading(stage, asked), *self._ends()]
-        self._hints = {False: hint(stage, _HINT), True: hint(stage, _TAKEN)}
+        self._hints = {False: hint(stage, said.rating_how), True: hint(stage, said.rating_taken)}
 
     def moves(self) -> float | None:
         """The marker."""
@@ -290,8 +281,6 @@ STOOD_S = 0.5
 _PADDING = 0.02
 _BELOW = 0.3  # of a letter: what a line may have below its base
 _SIZES = (0.04, 0.034, 0.029, 0.025, 0.021)
-_HOW = "Enter begins a new line. When you are done: the button, or Ctrl and Enter"
-_FULL = "There is no more room. When you are done: the button, or Ctrl and Enter"
 
 
 class DescriptionPage(Page):
@@ -312,9 +301,11 @@ class DescriptionPage(Page):
         self._height_px = stage.height_px
         self._room_px = (place.height - 2 * _PADDING) * stage.height_px
         self._box = _text_box(stage, place, str(drafts.get(asked.draft, "")))
-        self._button = Button(stage, "Done")
+        self._turned = Turned(stage, self._box, place) if stage.look.right_to_left else None
+        said = stage.look.messages
+        self._button = Button(stage, said.done)
         self._drawn = [*heading(stage, asked), self._box]
-        self._hints = {False: hint(stage, _HOW), True: hint(stage, _FULL)}
+        self._hints = {False: hint(stage, said.writing_how), True: hint(stage, said.writing_full)}
 
     def moves(self) -> tuple[str, int]:
         """Letters and caret."""
@@ -324,6 +315,8 @@ class DescriptionPage(Page):
         """The question, what was typed, the button."""
         for stimulus in (*self._drawn, self._hints[self._full]):
             stimulus.draw()
+        if self._turned is not None:
+            self._turned.draw(_SIZES[self._size])
         self._button.draw(enabled=True)
         self._drawn_s = min(self._drawn_s, self._now())
         self._fit()
@@ -359,13 +352,45 @@ class DescriptionPage(Page):
 
     def _too_high(self) -> bool:
         """Whether the text as it was last drawn, measured in pixels, is higher than the box within its padding."""
-        return bool(self._box.boundingBox.size[1] > self._room_px - _BELOW * _SIZES[self._size] * self._height_px)
+        height_px = self._box.boundingBox.size[1] if self._turned is None else self._turned.height_px
+        return bool(height_px > self._room_px - _BELOW * _SIZES[self._size] * self._height_px)
 
     def _write_in(self, size: float) -> None:
         """PsychoPy fetches letters of a new size only with the font, and lays out only with the text."""
         self._box.letterHeight = size
         self._box.font = self._box.font
         self._box.text = self._box.text
+
+
+_CARET = "|"
+
+
+class Turned:
+    """What is typed from right to left, with a caret. PsychoPy's box takes the keys and is drawn without its letters.
+
+    It would keep what it draws, in the order that it draws it, and so lose what was typed.
+    """
+
+    def __init__(self, stage: Stage, box: Any, place: TextBox) -> None:
+        self._stage, self._box = stage, box
+        right, top = place.x + place.width / 2 - _PADDING, place.y + place.height / 2 - _PADDING
+        self._place = TextBox(x=right, y=top, width=place.width - 2 * _PADDING, height=place.height)
+        self._drawn: Any = None
+        self._stood: object = None
+
+    @property
+    def height_px(self) -> float:
+        """How high the text is as it was drawn."""
+        return 0.0 if self._drawn is None else float(self._drawn.boundingBox[1])
+
+    def draw(self, size: float) -> None:
+        """The text as it stands, in letters of a size."""
+        text, caret = str(self._box.text), int(self._box.caret.index)
+        if (stands := (text, caret, size)) != self._stood:
+            self._stood = stands
+            shown = f"{text[:caret]}{_CARET}{text[caret:]}"
+            self._drawn = self._stage.written(shown, self._place, size, self._stage.palette.ink, "right")
+        self._drawn.draw()
 
 
 def _text_box(stage: Stage, place: TextBox, text: str) -> Any:
@@ -379,7 +404,7 @@ def _text_box(stage: Stage, place: TextBox, text: str) -> Any:
         letterHeight=_SIZES[0],
         padding=_PADDING,
         alignment="top left",
-        color=stage.palette.ink,
+        color=stage.palette.panel if stage.look.right_to_left else stage.palette.ink,  # then `Turned` draws it
         fillColor=stage.palette.panel,
         borderColor=stage.palette.muted,
         placeholder="",

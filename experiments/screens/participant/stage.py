@@ -14,14 +14,16 @@ from __future__ import annotations
 import os
 import tempfile
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import byref, c_int, c_ulong
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from experiments.screens.participant import messages
+from experiments.screens.participant.lettering import laid_out
 
 _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""
@@ -69,6 +71,8 @@ def _xlib() -> Any:
 
 
 _SMALLEST = 0.018
+_POINTS = 0.75
+"""Of a letter's height: its size as PsychoPy hands it to pyglet."""
 _SHRINK = 0.92
 _MARGIN = 0.94
 WINDOW_TITLE = "Recoil: participant"
@@ -155,6 +159,7 @@ class Stage:
         self.unasked: deque[messages.Unasked] = deque()
         """What is to be said without a question."""
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
+        self._font_files += [look.font_file] if look.font_file else []
         self._handlers = _Handlers(self)  # pyglet holds them weakly
         self.window.winHandle.push_handlers(self._handlers)
 
@@ -203,26 +208,39 @@ class Stage:
     def text(self, text: str, box: TextBox, size: float, color: str) -> Any:
         """Text that fits its box: smaller than asked if it must."""
         while True:
-            stimulus = self._text(text, box, size, color)
+            stimulus = self.written(text, box, size, color)
             width_px, height_px = stimulus.boundingBox
             fits = width_px <= box.width * self.height_px and height_px <= box.height * self.height_px
             if fits or size * _SHRINK < _SMALLEST:
                 return stimulus
             size *= _SHRINK
 
-    def _text(self, text: str, box: TextBox, size: float, color: str) -> Any:
+    def written(self, text: str, box: TextBox, size: float, color: str, align: str = "center") -> Any:
+        """Text in letters of one size, however much room that takes; `align`: which side of it stands at `box.x`."""
         return self.toolkit.visual.TextStim(
             self.window,
-            text=text or " ",  # PsychoPy cannot measure no text
+            text=self._lines(text, box.width, size) or " ",  # PsychoPy cannot measure no text
             font=self.look.font,
             fontFiles=self._font_files,
             pos=(box.x, box.y),
             height=size,
             wrapWidth=box.width,
             anchorVert=box.anchor,
-            anchorHoriz="center",
-            alignText="center",
+            anchorHoriz=align,
+            alignText=align,
             color=color,
+        )
+
+    def _lines(self, text: str, width: float, size: float) -> str:
+        """A text as it is drawn: from right to left, or with lines of its own, where the language asks for it."""
+        right_to_left, kit = self.look.right_to_left, self.toolkit
+
+        def measured(line: str) -> float:
+            font = kit.load_font(self.look.font, int(size * self.height_px * _POINTS))
+            return float(sum(glyph.advance for glyph in font.get_glyphs(line))) / self.height_px
+
+        return laid_out(
+            kit.shape(text) if right_to_left else text, width, measured, kit.turn if right_to_left else None
         )
 
     def panel(self, box: TextBox, fill: str) -> Any:
@@ -307,6 +325,9 @@ class Toolkit:
     key_epoch_s: float
     key: Any
     fonts: Path
+    load_font: Any
+    shape: Callable[[str], str]
+    turn: Callable[[str], str]
     now: Any
 
 
@@ -334,8 +355,11 @@ def load_toolkit() -> Toolkit:
     """Import PsychoPy. What it raises without a display or without a part of itself passes through."""
     # imported when used: see above
     import psychopy  # noqa: PLC0415
+    from arabic_reshaper import reshape  # noqa: PLC0415
+    from bidi import get_display  # noqa: PLC0415
     from psychopy import clock, logging, visual  # noqa: PLC0415
     from psychopy.hardware import keyboard  # noqa: PLC0415
+    from pyglet import font  # noqa: PLC0415
     from pyglet.window import key  # noqa: PLC0415
 
     logging.console.setLevel(logging.ERROR)
@@ -346,6 +370,9 @@ def load_toolkit() -> Toolkit:
         key_epoch_s=logging.defaultClock.getLastResetTime(),
         key=key,
         fonts=Path(psychopy.__file__).parent / "assets" / "fonts",
+        load_font=font.load,
+        shape=reshape,
+        turn=partial(get_display, base_dir="R"),
         now=clock.getTime,
     )
 

@@ -1,0 +1,134 @@
+"""Languages from gettext catalogues: folders LANGUAGE/LC_MESSAGES with `recoil.po` and `recoil.mo`, shipped or own.
+
+What says more than texts stands in the head of the `.po`: the language's own name, its fonts, its direction, and who
+has checked it. A catalogue is used whole or not at all.
+"""
+
+from __future__ import annotations
+
+import gettext
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages, translated
+from experiments.config.door import ConfigError
+from experiments.config.findings import LANGUAGE_CODE
+
+SHIPPED = Path(__file__).parent
+DOMAIN = "recoil"
+NAME, FONTS, DIRECTION, CHECKED_BY = "X-Language-Name", "X-Fonts", "X-Direction", "X-Checked-By"
+"""The entries in the head of a catalogue that say what gettext does not ask for."""
+NOBODY = "nobody"
+"""What the last of them says, where no native speaker has checked the catalogue."""
+
+
+def _nothing(_: str) -> str:
+    return ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Language:
+    """A language, as a run uses it. `fonts`: families, of which one must have all letters; the first that does is used.
+
+    `checked_by`: which native speaker checked it; empty if none did. `look_up` gives a text in this language, empty if
+    there is none.
+    """
+
+    code: str
+    name: str
+    fonts: tuple[str, ...]
+    right_to_left: bool = False
+    checked_by: str = ""
+    messages: ParticipantMessages = ENGLISH_MESSAGES
+    look_up: Callable[[str], str] = _nothing
+
+    @property
+    def title(self) -> str:
+        """Its code and name, and whether somebody checked it."""
+        return f"{self.code} ({self.name}{'' if self.checked_by else ', not checked by a native speaker'})"
+
+
+ENGLISH = Language(code="en", name="English", fonts=("Noto Sans",), checked_by="it is what the others are made from")
+
+
+def languages(folder: Path | None = None) -> dict[str, Path | None]:
+    """The languages that there are, with their files: a lab's before those that come along. English has none."""
+    found: dict[str, Path | None] = {ENGLISH.code: None}
+    for place in filter(None, (SHIPPED, folder)):
+        found |= {path.parts[-3]: path for path in sorted(place.glob(f"*/LC_MESSAGES/{DOMAIN}.mo"))}
+    return found
+
+
+def language(code: str, folder: Path | None = None) -> Language:
+    """A language by its code. `ConfigError`: there is none, or its catalogue cannot be used, and why."""
+    if folder is not None and not folder.is_dir():
+        raise ConfigError(f"--catalogues {folder}: no such folder; it must hold LANGUAGE/LC_MESSAGES/{DOMAIN}.mo")
+    known = languages(folder)
+    if code not in known:
+        where = "" if folder is None else f" here or in {folder}"
+        raise ConfigError(
+            f"--language {code}: no catalogue of that name{where}; there are {', '.join(sorted(known))}; "
+            "docs/howto/languages.md says how to make one, which --catalogues DIR then finds"
+        )
+    path = known[code]
+    return ENGLISH if path is None else _read(code, path)
+
+
+def check_allowed(one: Language, *, unchecked: bool) -> None:
+    """`ConfigError`, if no native speaker has checked the language, and nobody said that it may be used so."""
+    if not one.checked_by and not unchecked:
+        raise ConfigError(
+            f"--language {one.code}: no native speaker has checked it ({CHECKED_BY} in the head of its .po names "
+            "nobody); have it checked and compiled again, or add --unchecked: journal and report will say so"
+        )
+
+
+class _Absent(gettext.NullTranslations):
+    """Where a catalogue has nothing."""
+
+    def gettext(self, message: str) -> str:
+        del message
+        return ""
+
+
+def _read(code: str, path: Path) -> Language:
+    try:
+        with path.open("rb") as file:
+            catalogue = gettext.GNUTranslations(file)
+        catalogue.add_fallback(_Absent())
+        return _language(code, catalogue)
+    except (OSError, ValueError, struct.error, IndexError) as error:  # what gettext raises for bytes that are none
+        why = f"it is no compiled catalogue ({error})" if not isinstance(error, _Unfit) else str(error)
+        raise ConfigError(f"{path}: {why}; mend the .po beside it and compile it anew") from error
+
+
+class _Unfit(ValueError):  # noqa: N818 - what is so of a catalogue that can be read
+    """A catalogue that lacks something; the message says what."""
+
+
+def _language(code: str, catalogue: gettext.GNUTranslations) -> Language:
+    head = catalogue.info()
+    own, direction = head.get("language", ""), head.get(DIRECTION.lower(), "ltr")
+    if own != code or not re.match(LANGUAGE_CODE, code):
+        raise _Unfit(f"its head says Language: {own or 'nothing'}, and its folder {code}; they must be one code")
+    if direction not in ("ltr", "rtl"):
+        raise _Unfit(f"{DIRECTION}: {direction}; it must be ltr or rtl")
+    fonts = tuple(filter(None, (font.strip() for font in head.get(FONTS.lower(), "").split(","))))
+    if not fonts:
+        raise _Unfit(f"{FONTS} is missing in its head; name the font families that have its letters, with commas")
+    try:
+        messages = translated(catalogue.gettext)
+    except ValueError as error:
+        raise _Unfit(str(error)) from error
+    return Language(
+        code=code,
+        name=head.get(NAME.lower(), "") or code,
+        fonts=fonts,
+        right_to_left=direction == "rtl",
+        checked_by="" if (name := head.get(CHECKED_BY.lower(), NOBODY)) == NOBODY else name,
+        messages=messages,
+        look_up=catalogue.gettext,
+    )

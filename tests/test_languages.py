@@ -1,0 +1,297 @@
+"""The participant's language: what is in the catalogues, which are refused, and what a run in one of them records."""
+
+import ast
+import json
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+from babel.messages.pofile import read_po
+
+from experiments.catalogues import catalogue
+from experiments.catalogues.catalogue import (
+    CHECKED_BY,
+    DIRECTION,
+    DOMAIN,
+    ENGLISH,
+    FONTS,
+    SHIPPED,
+    check_allowed,
+    language,
+)
+from experiments.catalogues.fonts import font_for
+from experiments.catalogues.messages import ParticipantMessages, notes, placeholders
+from experiments.clock import VirtualClock
+from experiments.config.door import ConfigError
+from experiments.design.config import DesignConfig
+from experiments.design.shown_texts import letters_of, setup_in, shown_texts, texts_in
+from experiments.load import load_setup
+from experiments.record.journal import read_journal
+from experiments.run import RunRequest, run
+from experiments.screens.participant import messages as wire
+from experiments.screens.synthetic import synthetic_screen
+from experiments.study.folders import PlaceError
+from recoil.config_files import designs
+from tests.pseudo_languages import HEADS, LONG, RIGHT_TO_LEFT, SAID, compiled, write_catalogue, write_pseudo_languages
+
+ROOM = Path(catalogue.__file__).parents[1]
+SOURCES = sorted(SHIPPED.glob(f"*/LC_MESSAGES/{DOMAIN}.po"))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_pseudo_languages(tmp_path_factory.mktemp("catalogues"))
+
+
+def every_text():
+    """All that a participant of a shipped design sees or is read."""
+    shown = {one.text for name in designs() for one in shown_texts(load_setup(name).config)}
+    return {*notes(), *(text for text in shown if any(map(str.isalpha, text)))}
+
+
+def test_the_template_and_every_catalogue_have_every_text_with_the_same_names_in_braces():
+    assert SOURCES
+    for path in (SHIPPED / f"{DOMAIN}.pot", *SOURCES):
+        with path.open("rb") as file:
+            found = {one.id: one.string for one in read_po(file) if one.id}
+        assert set(found) == every_text(), f"{path}: run scripts/catalogues"
+        if path in SOURCES:
+            assert [text for text, said in found.items() if not said] == []
+            assert [text for text, said in found.items() if placeholders(text) != placeholders(said)] == []
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.parts[-3])
+def test_what_is_compiled_is_what_stands_in_the_source(source):
+    with source.open("rb") as file:
+        texts = {one.id: one.string for one in read_po(file) if one.id}
+    found = language(source.parts[-3])
+    assert {text: found.look_up(text) for text in texts} == texts
+    head = source.read_text(encoding="utf-8").partition("\n\n")[0]
+    assert f'"{FONTS}: {", ".join(found.fonts)}\\n"' in head
+    assert f'"{CHECKED_BY}: {found.checked_by or "nobody"}\\n"' in head
+
+
+def test_no_sentence_of_the_participants_pages_stands_outside_the_messages():
+    """Two words in a row are a sentence; what only errors and the window's own name say is not for participants."""
+    apart = {"Recoil: participant", "far left", "far right", "top left", "\\n\\n"}
+    found = set()
+    for name in ("pages.py", "lettering.py"):
+        tree = ast.parse((ROOM / "screens" / "participant" / name).read_text(encoding="utf-8"))
+        documents = {ast.get_docstring(node, clean=False) for node in ast.walk(tree) if isinstance(node, _DOCUMENTED)}
+        after_names = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in after_names:
+                found |= {node.value} - documents
+    assert {text for text in found if re.search(r"[A-Za-z]{2,} [A-Za-z]{2,}", text)} <= apart
+
+
+_DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
+
+
+def test_a_message_that_a_page_does_not_use_is_in_no_catalogue():
+    code = "".join(path.read_text(encoding="utf-8") for path in sorted((ROOM / "screens").rglob("*.py")))
+    code += (ROOM / "session" / "design_session.py").read_text(encoding="utf-8")
+    named = {one.name for one in fields(ParticipantMessages) if not one.name.startswith("key_")}
+    assert {name for name in named if not re.search(rf"\.{name}\b", code)} == set()
+
+
+@pytest.mark.parametrize("code", [LONG, RIGHT_TO_LEFT])
+def test_a_labs_own_folder_has_a_language_with_every_message(folder, code):
+    found = language(code, folder)
+    assert found.messages.wait == SAID[code]("Please wait.")
+    assert found.messages.place.format(number=2, of=3) == SAID[code]("Feedback {number} of {of}").format(number=2, of=3)
+    assert found.right_to_left == (code == RIGHT_TO_LEFT)
+    assert found.checked_by
+
+
+def test_a_language_without_a_catalogue_is_refused_with_those_that_there_are(folder):
+    with pytest.raises(ConfigError, match=r"--language tlh: no catalogue .* there are ar-XB, en, en-XA, zh;"):
+        language("tlh", folder)
+    with pytest.raises(ConfigError, match="no such folder"):
+        language("zh", folder / "none")
+
+
+def test_chinese_is_not_checked_and_says_so():
+    chinese = language("zh")
+    assert chinese.checked_by == ""
+    with pytest.raises(ConfigError, match=r"no native speaker has checked it .* add --unchecked"):
+        check_allowed(chinese, unchecked=False)
+    check_allowed(chinese, unchecked=True)
+
+
+DAMAGED = {
+    "a message that lacks": (SAID[LONG], HEADS[LONG], ("Confirm",), "it lacks 'Confirm'"),
+    "a name in braces that is gone": (lambda _: "x", HEADS[LONG], (), "must have the names in braces"),
+    "no fonts": (SAID[LONG], HEADS[LONG] | {FONTS: ""}, (), "X-Fonts is missing"),
+    "a direction that is none": (SAID[LONG], HEADS[LONG] | {DIRECTION: "up"}, (), "must be ltr or rtl"),
+    "another language's": (SAID[LONG], HEADS[LONG] | {"Language": "de"}, (), "says Language: de, and its folder en-XA"),
+}
+
+
+@pytest.mark.parametrize(("say", "head", "but", "said"), DAMAGED.values(), ids=DAMAGED)
+def test_a_catalogue_with(say, head, but, said, tmp_path):
+    write_catalogue(tmp_path, LONG, say, head, but)
+    with pytest.raises(ConfigError, match=re.escape(said)) as refused:
+        language(LONG, tmp_path)
+    assert str(refused.value).startswith(str(tmp_path))
+
+
+@pytest.mark.parametrize("data", [b"", b"no catalogue", b"\xde\x12\x04\x95", b"\xde\x12\x04\x95" + b"\xff" * 40])
+def test_bytes_that_are_no_catalogue_are_refused_by_name(data, tmp_path):
+    write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG]).write_bytes(data)
+    with pytest.raises(ConfigError, match=r"recoil\.mo: it is no compiled catalogue"):
+        language(LONG, tmp_path)
+
+
+@pytest.mark.parametrize("cut", range(40, 4_000, 397))
+def test_a_catalogue_that_is_cut_off_is_refused(cut, tmp_path):
+    path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
+    path.write_bytes(path.read_bytes()[:cut])
+    with pytest.raises(ConfigError, match=r"recoil\.mo: "):
+        language(LONG, tmp_path)
+
+
+# a design's texts
+
+
+@pytest.mark.parametrize("name", designs())
+def test_every_shipped_design_is_in_chinese(name):
+    setup = load_setup(name)
+    shown, texts = setup_in(language("zh"), setup)
+    assert [
+        one.place for one in shown_texts(shown.config) if one.text.isascii() and any(map(str.isalpha, one.text))
+    ] == []
+    assert set(texts.values()).isdisjoint(texts)
+    assert (
+        shown.config.model_copy(
+            update={
+                "questions": setup.config.questions,
+                "factors": setup.config.factors,
+                "opening": setup.config.opening,
+            }
+        )
+        == setup.config
+    )
+
+
+def test_english_changes_nothing():
+    setup = load_setup("preference")
+    assert setup_in(ENGLISH, setup) == (setup, {})
+    assert "language" not in setup.config.model_dump(mode="json")
+
+
+OWN = """[questions.response]
+text = "Wohin schoss das Gerät?\""""
+
+
+def test_a_text_that_the_catalogue_lacks_is_named_with_its_key(folder):
+    setup = load_setup("direction")
+    question = setup.config.questions["response"].model_copy(update={"text": "Where to?"})
+    own = replace(setup, config=setup.config.model_copy(update={"questions": {"response": question}}))
+    with pytest.raises(ConfigError, match=r"questions\.response\.text = 'Where to\?'; add it .* language = \"en-XA\""):
+        setup_in(language(LONG, folder), own)
+
+
+def test_a_design_in_the_language_itself_keeps_its_texts_but_for_the_answers_that_recoil_names(folder):
+    long, design = language(LONG, folder), load_setup("direction").config
+    own = DesignConfig.model_validate(design.model_dump() | {"language": LONG})
+    assert own.model_dump(mode="json")["language"] == LONG
+    assert texts_in(own, LONG, long.look_up) == {one: SAID[LONG](one) for one in ("forward", "backward")}
+    with pytest.raises(ConfigError, match="the catalogue en "):  # in English it would be half one, half the other
+        setup_in(ENGLISH, replace(load_setup("direction"), config=own))
+
+
+def test_two_answers_of_one_name_are_refused(tmp_path):
+    write_catalogue(tmp_path, LONG, lambda text: "ward" if text.endswith("ward") else SAID[LONG](text), HEADS[LONG])
+    with pytest.raises(ConfigError, match=r"questions\.response: two answers have one label among ward, ward"):
+        setup_in(language(LONG, tmp_path), load_setup("direction"))
+
+
+# fonts
+
+
+def test_a_font_without_a_letter_is_refused_with_the_letter():
+    lacking = replace(language("zh"), fonts=("Nowhere Sans", "DejaVu Sans"))
+    with pytest.raises(ConfigError, match=r"Nowhere Sans is not installed; DejaVu Sans lacks U\+\w+ .* and \d+ more"):
+        font_for(lacking, letters_of(lacking, load_setup("preference")))
+
+
+def test_english_looks_for_no_font_and_arabic_is_looked_for_in_the_forms_that_are_drawn(folder):
+    assert font_for(ENGLISH, "abc").path is None
+    turned = language(RIGHT_TO_LEFT, folder)
+    found = font_for(turned, letters_of(turned, load_setup("preference")))
+    assert found.family == "DejaVu Sans"
+    assert found.path is not None
+
+
+# runs
+
+
+def head_of(place):
+    return json.loads(place.journal.read_text(encoding="utf-8").splitlines()[0])
+
+
+def carried_out(results, said, **named):
+    setup = load_setup(named.pop("design", "preference"))
+    request = RunRequest(setup=setup, participant_id="P01", results=results, seed=1, language=said, **named)
+    return run(request, synthetic_screen, VirtualClock()).place
+
+
+def test_a_run_in_english_records_no_language(tmp_path):
+    place = carried_out(tmp_path, ENGLISH)
+    assert "language" not in head_of(place)
+    assert read_journal(place.journal).head.language is None
+
+
+def test_a_run_records_its_language_and_what_was_shown_and_its_table_is_the_same(tmp_path, folder):
+    place = carried_out(tmp_path / "long", language(LONG, folder), design="detection")
+    head = head_of(place)
+    shown = read_journal(place.journal).head.language
+    assert (shown.code, shown.name, shown.checked_by) == (LONG, "long", "a test")
+    assert shown.messages["right"] == SAID[LONG]("That was right.")
+    assert head["setup"]["experiment"]["questions"]["felt"]["text"] == "Did you feel a shot?"  # the design as it is
+    steps = [json.loads(line)["body"] for line in place.journal.read_text().splitlines() if '"kind":"step"' in line]
+    asked = next(one for one in steps if one["kind"] == "ask")
+    assert asked["text"] == SAID[LONG]("Did you feel a shot?")
+    assert [one["label"] for one in asked["choices"]] == [SAID[LONG]("yes"), SAID[LONG]("no")]
+    answers = re.compile(rb"\d{4}-\d\d-\d\dT[^,]*")
+    plain = carried_out(tmp_path / "english", ENGLISH, design="detection")
+    assert answers.sub(b"", place.table.read_bytes()) == answers.sub(b"", plain.table.read_bytes())
+
+
+def test_what_is_told_after_an_answer_is_in_the_language(tmp_path, folder):
+    setup = load_setup("detection")
+    trial = setup.config.trial.model_copy(update={"feedback": True})
+    told = replace(setup, config=setup.config.model_copy(update={"trial": trial}))
+    request = RunRequest(setup=told, participant_id="P01", results=tmp_path, seed=1, language=language(LONG, folder))
+    lines = run(request, synthetic_screen, VirtualClock()).place.journal.read_text().splitlines()
+    said = {body["text"] for line in lines if (body := json.loads(line).get("body")) and body.get("what") == "feedback"}
+    assert said <= {SAID[LONG]("That was right."), SAID[LONG]("That was wrong.")}
+    assert said
+
+
+def cut(place, lines=30):
+    """The journal as if the run had broken off."""
+    place.journal.write_bytes(b"".join(place.journal.read_bytes().splitlines(keepends=True)[:lines]))
+
+
+def test_a_run_goes_on_in_the_words_that_it_began_in(tmp_path, folder):
+    long = language(LONG, folder)
+    cut(carried_out(tmp_path, long))
+    with pytest.raises(PlaceError, match=r"began in en-XA, not in en; resume with --language en-XA"):
+        carried_out(tmp_path, ENGLISH, again="resume")
+    other = replace(long, messages=replace(long.messages, wait="Hold on."))
+    with pytest.raises(PlaceError, match="began with another catalogue en-XA than there is now"):
+        carried_out(tmp_path, other, again="resume")
+    checked = replace(long, checked_by="somebody else")  # the words are what counts
+    assert read_journal(carried_out(tmp_path, checked, again="resume").journal).finished
+
+
+def test_a_look_crosses_the_wire_with_its_messages(folder):
+    look = wire.Look(right_to_left=True, messages=language(RIGHT_TO_LEFT, folder).messages)
+    assert wire.look_from(wire.arguments(look)) == look
+
+
+def test_an_empty_catalogue_is_compiled_as_babel_does():
+    assert compiled({"": "Language: de\n"})[:4] == b"\xde\x12\x04\x95"
