@@ -15,7 +15,7 @@ from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
 from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
 from experiments.clock import RealClock
-from experiments.doctor.checks import carry_out_check, checks
+from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.doctor.figures import DoctorFinding
 from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
@@ -111,16 +111,26 @@ class Examination:
 
 
 def examine(
-    results: Path, gun: str, config: str, progress: Progress, *, shots: int = 0, sensor: str = ""
+    results: Path,
+    gun: str,
+    config: str,
+    progress: Progress,
+    *,
+    shots: int = 0,
+    sensor: str = "",
+    asked: LanguageAsked | None = None,
 ) -> Examination:
     """Carry out every check; `config` is the gun's, with the limit of its line. With `shots` the gun is fired.
+
+    A participant's language is looked at where it is asked for.
 
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
     findings, device = list[DoctorFinding](), load_gun(find(config))
     actuators = map(device.rendering, device.methods)
     friction_N = max((one.friction_N for one in actuators if isinstance(one, GunParameters)), default=0.0)
-    planned = checks(results, gun, device.serial.round_trip_limit_s, shots=shots, sensor=sensor, friction_N=friction_N)
+    limit_s = device.serial.round_trip_limit_s
+    planned = checks(results, gun, limit_s, shots=shots, sensor=sensor, friction_N=friction_N, asked=asked)
     with progress("doctor", len(planned)) as tell:
         for check in planned:
             findings += carry_out_check(check)

@@ -30,7 +30,11 @@ from pydantic import TypeAdapter
 from device import DeviceError, open_gun
 from device.plugin.conformance import conformance, rig_at
 from device.serial_gun.gun import speed_of
+from experiments.catalogues.catalogue import language
+from experiments.catalogues.fonts import font_for
+from experiments.catalogues.messages import NAMED_ANSWERS
 from experiments.clock import RealClock
+from experiments.config.door import ConfigError
 from experiments.doctor import verdicts
 from experiments.doctor.figures import (
     Adapter,
@@ -182,8 +186,23 @@ class Check:
     look: Callable[[], tuple[DoctorFinding, ...]]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LanguageAsked:
+    """A participant's language to look at, and where else there are catalogues."""
+
+    code: str
+    folder: Path | None = None
+
+
 def checks(
-    results: Path, gun: str, limit_s: float, *, shots: int = 0, sensor: str = "", friction_N: float = 0.0
+    results: Path,
+    gun: str,
+    limit_s: float,
+    *,
+    shots: int = 0,
+    sensor: str = "",
+    friction_N: float = 0.0,
+    asked: LanguageAsked | None = None,
 ) -> tuple[Check, ...]:
     """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back.
 
@@ -204,6 +223,7 @@ def checks(
         "keyboard": partial(_on_display, "keyboard", "keys"),
         "streams": _streams,
         "console": partial(_console, results),
+        **({"language": partial(_language, asked)} if asked is not None else {}),
     }
     return tuple(Check(name=name, look=look) for name, look in looks.items())
 
@@ -219,7 +239,11 @@ def carry_out_check(check: Check) -> tuple[DoctorFinding, ...]:
 
 
 def _reason(error: Exception) -> str:
-    return str(error) if isinstance(error, TimeoutError | DeviceError) else f"{type(error).__name__}: {error}"
+    return (
+        str(error)
+        if isinstance(error, TimeoutError | DeviceError | ConfigError)
+        else f"{type(error).__name__}: {error}"
+    )
 
 
 def no_display(environment: Mapping[str, str], platform: str) -> str:
@@ -298,6 +322,12 @@ def _streams() -> tuple[DoctorFinding, ...]:
 
 def _console(results: Path) -> tuple[DoctorFinding, ...]:
     return within_seconds(DEADLINE_S, lambda: verdicts.of_latencies(pooled(_latencies(results))))
+
+
+def _language(asked: LanguageAsked) -> tuple[DoctorFinding, ...]:
+    found = language(asked.code, asked.folder)
+    font = font_for(found, "".join((*found.messages.every, *map(found.look_up, NAMED_ANSWERS))))
+    return (verdicts.of_language(found, font),)
 
 
 def _latencies(results: Path) -> Iterator[Latencies]:

@@ -13,6 +13,8 @@ from itertools import pairwise
 from typing import Literal
 
 from device.plugin.conformance import ConformanceFinding
+from experiments.catalogues.catalogue import Language
+from experiments.catalogues.fonts import Font
 from experiments.doctor import figures
 from experiments.record.journal import Record, read_as
 from experiments.session.steps import OUTCOME, STEP, Answered, Fired, Outcome, Present
@@ -216,6 +218,13 @@ def of_adapters(found: Sequence[figures.Adapter]) -> figures.DoctorFinding:
     measured = ", ".join(f"{adapter.name}: latency timer {adapter.latency_ms} ms" for adapter in found)
     advice = "; ".join(f"echo {MAX_ADAPTER_MS} | sudo tee {adapter.setting}" for adapter in slow)
     return _judged("USB adapter", measured, advice, figures.Adapters(adapters=tuple(found)))
+
+
+def of_language(found: Language, font: Font) -> figures.DoctorFinding:
+    """A language whose messages are all there, in a font that has all their letters."""
+    measured = f"{found.code} ({found.name}): every message is there; {font.family} has all letters"
+    advice = "" if found.checked_by else "have a native speaker check it; until then runs in it need --unchecked"
+    return _judged("language", measured, advice, figures.NoFigures())
 
 
 def of_seen(found: figures.ProgramFigures) -> figures.DoctorFinding:

@@ -120,13 +120,22 @@ def doctor(
         str,
         typer.Option(help="Config of the gun, with the limit of its line's round trip (serial.round_trip_limit_s)."),
     ] = "gun",
+    language: Annotated[
+        str | None,
+        typer.Option(metavar="CODE", help="A participant's language: is all of it there, and a font for it?"),
+    ] = None,
+    catalogues: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="With --language: a folder with catalogues of your own.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Keep the result.")] = None,
     as_json: AsJsonOption = False,
 ) -> None:
     """The rig's self-test: what was measured, and what to do about what is not good."""
+    from experiments.doctor.checks import LanguageAsked
     from recoil import rig as feature
 
-    found = feature.examine(results, gun, gun_config, progress, shots=fire, sensor=sensor)
+    asked = None if language is None else LanguageAsked(code=language, folder=catalogues)
+    found = feature.examine(results, gun, gun_config, progress, shots=fire, sensor=sensor, asked=asked)
     show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)
