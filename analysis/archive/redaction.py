@@ -45,6 +45,7 @@ _SAFE = frozenset(
             "gun",
             "clock",
             "experimenter_knows",
+            "language",
             "provenance",
         ),
         *(

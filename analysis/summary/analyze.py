@@ -21,6 +21,7 @@ from analysis.summary import remarks_coding
 from analysis.summary.comparison import compare
 from analysis.summary.delivered import delivered_courses
 from analysis.summary.deviations import AnalysisFiles, deviations, frozen_tests
+from analysis.summary.languages import unchecked_languages
 from analysis.summary.participation import exclusion_lines, participation
 from analysis.summary.request_data import answers_to, frozen_answer
 from analysis.summary.requests import Requested, Requests
@@ -148,7 +149,10 @@ def _analysis(
     kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
     used = replace(request.files, answered=main.frozen)
     frozen, edited = deviations(first, used) if request.against_frozen else ((), ())
-    statistics = replace(main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None)
+    warnings = (*main.statistics.warnings, *unchecked_languages(logs.runs))
+    statistics = replace(
+        main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None, warnings=warnings
+    )
     told = _told(main)
     compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))
     report = replace(
