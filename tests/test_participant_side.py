@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages, translated
 from experiments.design.plan import Trial, condition
 from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
@@ -30,10 +31,10 @@ STEP = rate(TRIAL)
 class Told:
     """A participant's screen whose program writes down what it is told, and never answers."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, said: ParticipantMessages = ENGLISH_MESSAGES) -> None:
         self._file = folder / "told"
         self.link = ParticipantLink.start(command=(sys.executable, "-c", PROGRAM, str(self._file)))
-        self.side = ParticipantSide(self.link, lambda: self.link, SETUP, rates=True, own_keys=False)
+        self.side = ParticipantSide(self.link, lambda: self.link, SETUP, rates=True, own_keys=False, said=said)
         self.side.planned = 3
 
     def at(self, serial: int, *states: State, step: Rate | Describe = STEP) -> None:
@@ -104,6 +105,19 @@ def test_between_a_rating_and_its_description_the_participants_window_keeps_the_
     }  # fmt: skip
     asked = next(word for word in told.all if word["kind"] == "ask-description")
     assert (asked["number"], asked["of"], asked["question"]) == (1, 3, "?")
+
+
+def test_what_stands_between_questions_is_in_the_participants_language(tmp_path: Path) -> None:
+    said = translated(lambda text: f"¿{text}")
+    told = Told(tmp_path, said)
+    told.at(1, State.PREPARING)
+    told.at(2, State.RATING)
+    wait_for(lambda: "ask-rating" in told.words)
+    told.at(3, State.SAVING)
+    told.at(4, State.RATING, State.PAUSED)
+    told.at(5, State.CLOSING)
+    assert told.end() == ["ask-rating", said.between, said.paused, said.thanks, "end"]
+    told.link.close()
 
 
 def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened() -> None:

@@ -21,6 +21,7 @@ from PyQt6.QtGui import QKeyEvent, QWheelEvent
 from PyQt6.QtTest import QTest
 from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
 
+from experiments.catalogues.catalogue import ENGLISH, language
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
@@ -278,6 +279,18 @@ def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: Stud
     assert (choice.screen, choice.gun, choice.results) == ("console", SERIAL, study.results)
     assert not window.isVisible()
     assert read_register(study.results).members["P01"].facts == FACTS
+
+
+def test_the_language_is_chosen_where_there_are_several_and_chinese_says_that_nobody_checked_it(opened: Open) -> None:
+    alone = opened()
+    assert not alone.form.languages.isVisible()
+    window = opened(languages=(ENGLISH, language("zh")), language="zh")
+    assert window.form.languages.isVisible()
+    assert window.form.languages.currentText() == "zh (中文, not checked by a native speaker)"
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert window.choice is not None
+    assert window.choice.language.code == "zh"
 
 
 @pytest.mark.parametrize(
