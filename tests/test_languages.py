@@ -4,11 +4,14 @@ import ast
 import json
 import re
 from dataclasses import fields, replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from babel.messages.pofile import read_po
 
+from analysis.logs.journals import RunFile
+from analysis.summary.languages import unchecked_languages
 from experiments.catalogues import catalogue
 from experiments.catalogues.catalogue import (
     CHECKED_BY,
@@ -25,14 +28,21 @@ from experiments.catalogues.messages import ParticipantMessages, notes, placehol
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.design.config import DesignConfig
+from experiments.design.planning import plan_of
 from experiments.design.shown_texts import letters_of, setup_in, shown_texts, texts_in
+from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.load import load_setup
 from experiments.record.journal import read_journal
 from experiments.run import RunRequest, run
+from experiments.screens import texts
 from experiments.screens.participant import messages as wire
 from experiments.screens.synthetic import synthetic_screen
+from experiments.screens.terminal import TerminalScreen
+from experiments.session.states import Position, State
+from experiments.session.steps import Rate
 from experiments.study.folders import PlaceError
 from recoil.config_files import designs
+from recoil.session import LanguageOptions, run_session
 from tests.pseudo_languages import HEADS, LONG, RIGHT_TO_LEFT, SAID, compiled, write_catalogue, write_pseudo_languages
 
 ROOM = Path(catalogue.__file__).parents[1]
@@ -181,10 +191,6 @@ def test_english_changes_nothing():
     assert "language" not in setup.config.model_dump(mode="json")
 
 
-OWN = """[questions.response]
-text = "Wohin schoss das Gerät?\""""
-
-
 def test_a_text_that_the_catalogue_lacks_is_named_with_its_key(folder):
     setup = load_setup("direction")
     question = setup.config.questions["response"].model_copy(update={"text": "Where to?"})
@@ -295,3 +301,75 @@ def test_a_look_crosses_the_wire_with_its_messages(folder):
 
 def test_an_empty_catalogue_is_compiled_as_babel_does():
     assert compiled({"": "Language: de\n"})[:4] == b"\xde\x12\x04\x95"
+
+
+# what is said of it
+
+
+def test_the_report_names_who_saw_unchecked_texts_and_nobody_else(tmp_path, folder):
+    runs = []
+    for name, said in (("a", language("zh")), ("b", language(LONG, folder)), ("c", ENGLISH)):
+        place = carried_out(tmp_path / name, said)
+        runs.append(run_file(place, name.upper()))
+    runs.append(replace(runs[0], path=str(tmp_path / "gone.jsonl")))
+    assert list(unchecked_languages(runs)) == [
+        "preference: A saw and heard zh (中文), in texts that no native speaker had checked"
+    ]
+
+
+def run_file(place, code):
+    return RunFile(path=str(place.journal), participant=code, experiment="preference", kind="synthetic", study="")
+
+
+def test_the_doctor_names_the_font_and_what_is_amiss(folder):
+    def verdict(code):
+        wanted = checks(Path("results"), "simulated", 0.01, asked=LanguageAsked(code=code, folder=folder))
+        (found,) = carry_out_check(next(one for one in wanted if one.name == "language"))
+        return found.verdict, found.measured, found.advice
+
+    assert verdict(LONG) == ("good", "en-XA (long): every message is there; Noto Sans has all letters", "")
+    assert verdict("zh")[0] == "warning"
+    assert "have a native speaker check it" in verdict("zh")[2]
+    refused = verdict("tlh")
+    assert refused[0] == "fails"
+    assert refused[1].startswith("--language tlh: no catalogue of that name")
+    assert "language" not in [one.name for one in checks(Path("results"), "simulated", 0.01)]
+
+
+def test_at_a_terminal_what_is_read_out_is_in_the_language_and_what_is_saved_in_english(folder):
+    long = language(LONG, folder)
+    setup, _ = setup_in(long, load_setup("preference"))
+    plan = plan_of(setup.config, "P01", 1)
+    screen = TerminalScreen(plan, VirtualClock(), StringIO(), StringIO(), messages=long.messages)
+    step = Rate(
+        trial=plan.trials[1],
+        question="rating",
+        text=setup.config.questions["rating"].text,
+        minimum=0.0,
+        maximum=10.0,
+        minimum_text="a",
+        maximum_text="b",
+        grain=0.1,
+        later=True,
+    )
+    text = screen.text(Position(states=(State.RATING,), step=step))
+    assert long.messages.place.format(number=2, of=3) in text
+    assert step.text in text
+    assert texts.about_text(plan, step) == "Feedback 2 of 3"
+
+
+def test_the_languages_to_choose_from_are_the_checked_ones_unless_it_is_said_otherwise(folder):
+    def offered(unchecked):
+        return {one.code for one in LanguageOptions(folder=folder, unchecked=unchecked).usable()}
+
+    assert offered(False) == {"en", LONG, RIGHT_TO_LEFT}
+    assert offered(True) == {"en", LONG, RIGHT_TO_LEFT, "zh"}
+
+
+def test_a_resumed_run_goes_on_in_its_own_language_without_being_told(tmp_path, folder):
+    cut(carried_out(tmp_path, language(LONG, folder)))
+    request = RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, again="resume")
+    place = run_session(request, LanguageOptions(folder=folder))
+    assert read_journal(place.journal).finished
+    with pytest.raises(ConfigError, match="no catalogue of that name"):
+        run_session(replace(request, again="fresh"), LanguageOptions(code="tlh"))
