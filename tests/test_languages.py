@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+import runpy
 from dataclasses import fields, replace
 from io import StringIO
 from pathlib import Path
@@ -69,6 +70,12 @@ def test_the_template_and_every_catalogue_have_every_text_with_the_same_names_in
         if path in SOURCES:
             assert [text for text, said in found.items() if not said] == []
             assert [text for text, said in found.items() if placeholders(text) != placeholders(said)] == []
+
+
+def test_the_template_of_the_consoles_captions_is_as_the_console_has_them():
+    made = runpy.run_path(str(ROOM.parent / "scripts" / "catalogues"))["console_template"]()
+    with (SHIPPED / "console.pot").open("rb") as file:
+        assert [one.id for one in read_po(file)] == [one.id for one in made], "run scripts/catalogues"
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.parts[-3])
