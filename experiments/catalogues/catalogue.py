@@ -48,7 +48,7 @@ class Language:
     @property
     def title(self) -> str:
         """Its code and name, and whether somebody checked it."""
-        return f"{self.code} ({self.name}{'' if self.checked_by else ', not checked by a native speaker'})"
+        return f"{self.code} ({self.name}{'' if self.checked_by else ', unchecked'})"
 
 
 ENGLISH = Language(code="en", name="English", fonts=("Noto Sans",), checked_by="it is what the others are made from")

@@ -367,6 +367,7 @@ _BROKEN = {
     "display": _WINDOWLESS,
     "keyboard": _WINDOWLESS,
     "PsychoPy": "see that a display with OpenGL is there, and that the system libraries of PsychoPy are installed",
+    "language": "mend that, and look again; docs/howto/languages.md says how",
 }
 
 
