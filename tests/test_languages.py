@@ -138,8 +138,9 @@ def test_chinese_is_not_checked_and_says_so():
 
 
 DAMAGED = {
-    "a message that lacks": (SAID[LONG], HEADS[LONG], ("Confirm",), "it lacks 'Confirm'"),
+    "a message that lacks": (SAID[LONG], HEADS[LONG], ("Confirm",), "lacks 'Confirm'"),
     "a name in braces that is gone": (lambda _: "x", HEADS[LONG], (), "must have the names in braces"),
+    "a mark that turns the text": (lambda text: f"{text}\u202e", HEADS[LONG], (), "U+202E, which is not printed"),
     "no fonts": (SAID[LONG], HEADS[LONG] | {FONTS: ""}, (), "X-Fonts is missing"),
     "a direction that is none": (SAID[LONG], HEADS[LONG] | {DIRECTION: "up"}, (), "must be ltr or rtl"),
     "another language's": (SAID[LONG], HEADS[LONG] | {"Language": "de"}, (), "says Language: de, and its folder en-XA"),
@@ -202,7 +203,9 @@ def test_a_text_that_the_catalogue_lacks_is_named_with_its_key(folder):
     setup = load_setup("direction")
     question = setup.config.questions["response"].model_copy(update={"text": "Where to?"})
     own = replace(setup, config=setup.config.model_copy(update={"questions": {"response": question}}))
-    with pytest.raises(ConfigError, match=r"questions\.response\.text = 'Where to\?'; add it .* language = \"en-XA\""):
+    with pytest.raises(
+        ConfigError, match=r"lacks .* questions\.response\.text = 'Where to\?'; add it .* language = 'en-XA'"
+    ):
         setup_in(language(LONG, folder), own)
 
 
@@ -217,7 +220,7 @@ def test_a_design_in_the_language_itself_keeps_its_texts_but_for_the_answers_tha
 
 def test_two_answers_of_one_name_are_refused(tmp_path):
     write_catalogue(tmp_path, LONG, lambda text: "ward" if text.endswith("ward") else SAID[LONG](text), HEADS[LONG])
-    with pytest.raises(ConfigError, match=r"questions\.response: two answers have one label among ward, ward"):
+    with pytest.raises(ConfigError, match=r"gives two answers of questions\.response one label: ward, ward"):
         setup_in(language(LONG, tmp_path), load_setup("direction"))
 
 

@@ -11,10 +11,11 @@ import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages, translated
-from experiments.config.door import ConfigError
+from experiments.config.door import ConfigError, printable
 from experiments.config.findings import LANGUAGE_CODE
 
 SHIPPED = Path(__file__).parent
@@ -105,6 +106,20 @@ def _read(code: str, path: Path) -> Language:
         raise ConfigError(f"{path}: {why}; mend the .po beside it and compile it anew") from error
 
 
+_JOINERS = str.maketrans("", "", "\u200c\u200d")
+"""Not printed, but part of how Persian and other languages are written."""
+
+
+def _printed(translate: Callable[[str], str], text: str) -> str:
+    """A text in another language. `ValueError` for one with what is not printed: nobody would see it."""
+    found = translate(text)
+    try:
+        printable(found.translate(_JOINERS))
+    except ValueError as error:
+        raise ValueError(f"has for {text!r} a text that {error}") from error
+    return found
+
+
 class _Unfit(ValueError):  # noqa: N818 - what is so of a catalogue that can be read
     """A catalogue that lacks something; the message says what."""
 
@@ -119,8 +134,9 @@ def _language(code: str, catalogue: gettext.GNUTranslations) -> Language:
     fonts = tuple(filter(None, (font.strip() for font in head.get(FONTS.lower(), "").split(","))))
     if not fonts:
         raise _Unfit(f"{FONTS} is missing in its head; name the font families that have its letters, with commas")
+    look_up = partial(_printed, catalogue.gettext)
     try:
-        messages = translated(catalogue.gettext)
+        messages = translated(look_up)
     except ValueError as error:
         raise _Unfit(str(error)) from error
     return Language(
@@ -130,5 +146,5 @@ def _language(code: str, catalogue: gettext.GNUTranslations) -> Language:
         right_to_left=direction == "rtl",
         checked_by="" if (name := head.get(CHECKED_BY.lower(), NOBODY)) == NOBODY else name,
         messages=messages,
-        look_up=catalogue.gettext,
+        look_up=look_up,
     )

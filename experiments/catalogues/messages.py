@@ -86,19 +86,20 @@ def _problems(texts: dict[str, str]) -> Iterator[str]:
     missing = [repr(text) for text, found in texts.items() if not found.strip()]
     if missing:
         more = f" and {len(missing) - _MOST_NAMED} more texts" if len(missing) > _MOST_NAMED else ""
-        yield f"it lacks {', '.join(missing[:_MOST_NAMED])}{more}"
+        yield f"lacks {', '.join(missing[:_MOST_NAMED])}{more}"
     for text, found in texts.items():
         if placeholders(text) != placeholders(found):
             yield f"{found!r}: must have the names in braces that {text!r} has, and no others"
 
 
 def placeholders(text: str) -> list[str]:
-    """The names in braces of a message, in the alphabet's order.
+    """The names in braces of a message, with whatever else stands in the braces, in the alphabet's order.
 
-    >>> placeholders("{of} 个反馈中的第 {number} 个"), placeholders("50 %"), placeholders("{")
-    (['number', 'of'], [], ['{'])
+    >>> placeholders("{of} 个反馈中的第 {number} 个"), placeholders("{of:>9}"), placeholders("50 %"), placeholders("{")
+    (['number', 'of'], ['of:>9'], [], ['{'])
     """
     try:
-        return sorted(name for _, name, _, _ in Formatter().parse(text) if name is not None)
+        parts = [(name, form, how) for _, name, form, how in Formatter().parse(text) if name is not None]
+        return sorted(name + (f"!{how}" if how else "") + (f":{form}" if form else "") for name, form, how in parts)
     except ValueError:
         return [text]

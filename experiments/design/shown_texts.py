@@ -54,10 +54,7 @@ def setup_in(language: Language, setup: Setup[DesignConfig]) -> tuple[Setup[Desi
         texts = texts_in(design, language.code, language.look_up)
         return replace(setup, config=with_texts(design, texts)), texts
     except ValueError as error:
-        raise ConfigError(
-            f"{setup.source}: the catalogue {language.title} lacks what this design says: {error}; add it there, or "
-            f'say language = "{language.code}" at the top of the design if its texts are in that language'
-        ) from error
+        raise ConfigError(f"{setup.source}: the catalogue {language.title} {error}") from error
 
 
 def letters_of(language: Language, setup: Setup[DesignConfig]) -> str:
@@ -77,7 +74,11 @@ def texts_in(design: DesignConfig, code: str, look_up: Callable[[str], str]) -> 
         shown = [one for one in shown if one.named and one.text in NAMED_ANSWERS]
     missing = [one for one in shown if not look_up(one.text).strip()]
     if missing:
-        raise ValueError("; ".join(f"{one.place} = {one.text!r}" for one in missing))
+        named = "; ".join(f"{one.place} = {one.text!r}" for one in missing)
+        raise ValueError(
+            f"lacks what this design says: {named}; add it there, or say language = {code!r} at the top of the design "
+            "if its texts are in that language"
+        )
     return {one.text: look_up(one.text) for one in shown}
 
 
@@ -104,5 +105,5 @@ def _question(name: str, question: QuestionConfig, said: Callable[[str], str]) -
     ends = {key: said(text) for key in ("minimum_text", "maximum_text") if (text := getattr(question, key))}
     labels = {answer: said(question.label(answer)) for answer in question.named_answers}
     if len(set(labels.values())) < len(labels):
-        raise ValueError(f"questions.{name}: two answers have one label among {', '.join(labels.values())}")
+        raise ValueError(f"gives two answers of questions.{name} one label: {', '.join(labels.values())}")
     return question.model_copy(update={"text": said(question.text), "labels": labels, **ends})
