@@ -235,6 +235,8 @@ def test_a_font_without_a_letter_is_refused_with_the_letter():
 
 def test_english_looks_for_no_font_and_arabic_is_looked_for_in_the_forms_that_are_drawn(folder):
     assert font_for(ENGLISH, "abc").path is None
+    with pytest.raises(ConfigError, match=r"Noto Sans lacks U\+67AA .* say in the design in which language"):
+        font_for(ENGLISH, "枪")
     turned = language(RIGHT_TO_LEFT, folder)
     found = font_for(turned, letters_of(turned, load_setup("preference")))
     assert found.family == "DejaVu Sans"

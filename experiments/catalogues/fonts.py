@@ -43,10 +43,12 @@ def font_for(language: Language, letters: str) -> Font:
         if not missing:
             return Font(family=family, path=path)
         lacking[family] = f"lacks {_named(missing)}"
+    other = "name another in the head of the catalogue"
+    other = "say in the design in which language it is written" if language is ENGLISH else other
     raise ConfigError(
         f"language {language.code} ({language.name}): no font has all its letters, so participants would see empty "
         f"boxes: {'; '.join(f'{family} {why}' for family, why in lacking.items())}. Install one of them (as a file in "
-        f"{_own_folder()}, or by your system's packages), or name another in the head of the catalogue"
+        f"{_own_folder()}, or by your system's packages), or {other}"
     )
 
 

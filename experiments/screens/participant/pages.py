@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal
 
 from experiments.screens.participant import messages
@@ -304,7 +305,7 @@ class DescriptionPage(Page):
         self._turned = Turned(stage, self._box, place) if stage.look.right_to_left else None
         said = stage.look.messages
         self._button = Button(stage, said.done)
-        self._drawn = [*heading(stage, asked), self._box]
+        self._drawn = [*heading(stage, asked), *([self._box] if self._turned is None else [])]
         self._hints = {False: hint(stage, said.writing_how), True: hint(stage, said.writing_full)}
 
     def moves(self) -> tuple[str, int]:
@@ -362,11 +363,11 @@ class DescriptionPage(Page):
         self._box.text = self._box.text
 
 
-_CARET = "|"
+_CARET, _EDGE = "|", 0.005
 
 
 class Turned:
-    """What is typed from right to left, with a caret. PsychoPy's box takes the keys and is drawn without its letters.
+    """What is typed from right to left, with a caret, on a panel. PsychoPy's box takes the keys, and is not drawn.
 
     It would keep what it draws, in the order that it draws it, and so lose what was typed.
     """
@@ -374,6 +375,8 @@ class Turned:
     def __init__(self, stage: Stage, box: Any, place: TextBox) -> None:
         self._stage, self._box = stage, box
         right, top = place.x + place.width / 2 - _PADDING, place.y + place.height / 2 - _PADDING
+        edge = replace(place, width=place.width + _EDGE, height=place.height + _EDGE)
+        self._panel = [stage.panel(edge, stage.palette.muted), stage.panel(place, stage.palette.panel)]
         self._place = TextBox(x=right, y=top, width=place.width - 2 * _PADDING, height=place.height)
         self._drawn: Any = None
         self._stood: object = None
@@ -390,7 +393,8 @@ class Turned:
             self._stood = stands
             shown = f"{text[:caret]}{_CARET}{text[caret:]}"
             self._drawn = self._stage.written(shown, self._place, size, self._stage.palette.ink, "right")
-        self._drawn.draw()
+        for stimulus in (*self._panel, self._drawn):
+            stimulus.draw()
 
 
 def _text_box(stage: Stage, place: TextBox, text: str) -> Any:
@@ -404,7 +408,7 @@ def _text_box(stage: Stage, place: TextBox, text: str) -> Any:
         letterHeight=_SIZES[0],
         padding=_PADDING,
         alignment="top left",
-        color=stage.palette.panel if stage.look.right_to_left else stage.palette.ink,  # then `Turned` draws it
+        color=stage.palette.ink,
         fillColor=stage.palette.panel,
         borderColor=stage.palette.muted,
         placeholder="",

@@ -159,7 +159,9 @@ class Stage:
         self.unasked: deque[messages.Unasked] = deque()
         """What is to be said without a question."""
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
-        self._font_files += [look.font_file] if look.font_file else []
+        if look.font_file:
+            self._font_files.append(look.font_file)
+            toolkit.add_font(look.font_file)  # boxes to type in look for theirs elsewhere
         self._handlers = _Handlers(self)  # pyglet holds them weakly
         self.window.winHandle.push_handlers(self._handlers)
 
@@ -326,6 +328,7 @@ class Toolkit:
     key: Any
     fonts: Path
     load_font: Any
+    add_font: Any
     shape: Callable[[str], str]
     turn: Callable[[str], str]
     now: Any
@@ -359,6 +362,7 @@ def load_toolkit() -> Toolkit:
     from bidi import get_display  # noqa: PLC0415
     from psychopy import clock, logging, visual  # noqa: PLC0415
     from psychopy.hardware import keyboard  # noqa: PLC0415
+    from psychopy.visual.textbox2.textbox2 import allFonts  # noqa: PLC0415
     from pyglet import font  # noqa: PLC0415
     from pyglet.window import key  # noqa: PLC0415
 
@@ -371,6 +375,7 @@ def load_toolkit() -> Toolkit:
         key=key,
         fonts=Path(psychopy.__file__).parent / "assets" / "fonts",
         load_font=font.load,
+        add_font=allFonts.addFontFile,
         shape=reshape,
         turn=partial(get_display, base_dir="R"),
         now=clock.getTime,
