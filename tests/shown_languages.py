@@ -1,7 +1,7 @@
 """The participant's real window in a language, page by page: what `make pictures` and the tests look at."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -54,12 +54,17 @@ class Pages:
 
     def asked(self, question: AskRating | AskDescription | AskChoice) -> Any:
         """Ask, and come back when the question stands there; what it will come to."""
-        self.link.show("…")
-        before = self.picture().tobytes()
         ask = {AskRating: "ask_rating", AskDescription: "ask_description", AskChoice: "ask_choice"}[type(question)]
-        answer = self._console.submit(getattr(self.link, ask), question)
-        wait_for(lambda: self.picture().tobytes() != before, "the display does not change")
-        return answer
+        self._changing(lambda: self.link.show("…"))
+        return self._changing(lambda: self._console.submit(getattr(self.link, ask), question))
+
+    def _changing(self, act: Callable[[], Any]) -> Any:
+        """Do what changes the display, and come back when it has; what that gives back."""
+        before = self._seen()
+        done = act()
+        wait_for(lambda: self._seen() != before, "the display does not change")
+        self.picture()
+        return done
 
     @property
     def questions(self) -> dict[str, AskRating | AskDescription | AskChoice]:
