@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
 
 from pydantic import TypeAdapter
 
@@ -86,13 +86,23 @@ _BLANKS: dict[str, object] = {
 """What most trials and steps do not have, by the name of its field."""
 
 
-def without_blanks(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
-    """A `dict_factory` for trials and steps: of an instruction, intervals or a catch that is not there no key is kept.
+def plain_fields(value: Any) -> dict[str, object]:
+    """The fields of a plan, step or remark as plain JSON values, and those of what it holds.
 
-    >>> without_blanks([("set", 1), ("instruction", ""), ("odd", 0)])
-    {'set': 1, 'odd': 0}
+    Of an instruction, intervals or a catch that is not there no key is kept. `dataclasses.asdict` copies every value
+    deeply, which was an eighth of what a run computes.
+
+    >>> plain_fields(Trial(session=1, set=2, trial=3, levels=(("method", "vibration"),)))
+    {'session': 1, 'set': 2, 'trial': 3, 'levels': (('method', 'vibration'),)}
     """
-    return {key: value for key, value in pairs if key not in _BLANKS or value != _BLANKS[key]}
+    named = ((field.name, getattr(value, field.name)) for field in fields(value))
+    return {name: _plain(one) for name, one in named if name not in _BLANKS or one != _BLANKS[name]}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return plain_fields(value) if is_dataclass(value) else value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,7 +202,7 @@ class Plan:
 
     def record(self) -> dict[str, object]:
         """The plan as plain JSON values."""
-        return asdict(self, dict_factory=without_blanks)
+        return plain_fields(self)
 
     @classmethod
     def from_record(cls, record: object) -> Plan:

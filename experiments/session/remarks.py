@@ -5,12 +5,12 @@ The old value of a correction stays in the journal; the table shows the last one
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from experiments.design.plan import Trial, without_blanks
+from experiments.design.plan import Trial, plain_fields
 from experiments.tasks.questions import AnswerValue
 
 
@@ -160,7 +160,7 @@ REMARK: TypeAdapter[Remark] = TypeAdapter(
 
 def remark_record(remark: Remark) -> dict[str, object]:
     """A remark as plain JSON values."""
-    return asdict(remark, dict_factory=without_blanks)
+    return plain_fields(remark)
 
 
 def remark_kind(remark: Remark) -> Literal["remark", "measured"]:

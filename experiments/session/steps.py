@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
 from device.words import ShotTiming
-from experiments.design.plan import Condition, Trial, without_blanks
+from experiments.design.plan import Condition, Trial, plain_fields
 from experiments.tasks.questions import AnswerValue, Choice
 
 
@@ -342,8 +342,8 @@ OUTCOME: TypeAdapter[Outcome] = TypeAdapter(
 
 def step_record(word: Step | Outcome | TrainShot) -> dict[str, object]:
     """A step, outcome or shot as plain JSON values; an instruction, and what is not always known, only where it is."""
-    fields = asdict(word, dict_factory=without_blanks)
-    return {key: value for key, value in fields.items() if key not in _OPTIONAL_FIELDS or value is not None}
+    named = plain_fields(word).items()
+    return {key: value for key, value in named if key not in _OPTIONAL_FIELDS or value is not None}
 
 
 def step_after(session: Session, outcome: Outcome) -> Step | None:
