@@ -20,7 +20,6 @@ from hypothesis import settings
 
 from experiments.load import shipped_folder
 from tests import figure_files, warm_start
-from tests.waiting import PATIENCE_S
 
 gc.disable()  # what is collected here stays: six thousand tests and all that they import, gone through again and again
 
@@ -68,15 +67,7 @@ def recoil(tmp_path: Path) -> Recoil:
     environment = {key: value for key, value in os.environ.items() if key in ("PATH", "LANG", "LC_ALL", "TMPDIR")}
 
     def call(*words: object, **variables: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            warm_start.warm(*words),
-            cwd=tmp_path,
-            env=environment | {"HOME": str(home)} | variables,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=PATIENCE_S,
-        )
+        return warm_start.run_warm(*words, cwd=tmp_path, env=environment | {"HOME": str(home)} | variables)
 
     return call
 

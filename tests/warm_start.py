@@ -18,11 +18,13 @@ import runpy
 import selectors
 import signal
 import socket
+import subprocess
 import sys
+import tempfile
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
@@ -30,6 +32,8 @@ from typing import NoReturn
 
 from analysis.report import page
 from tests import figure_files
+from tests.waiting import PATIENCE_S
+from tests.warm_client import ask
 
 FOLDER = "RECOIL_TESTS_WARM_START"
 """The variable that names the folder of the server's socket."""
@@ -70,10 +74,33 @@ PRELOADED = [
 
 def warm(*words: object) -> list[str]:
     """What to start instead of `recoil WORDS` or, where they begin with `-m`, of `python WORDS`."""
+    return [sys.executable, "-S", "-E", str(CLIENT), str(_address()), *map(str, words)]
+
+
+def run_warm(*words: object, cwd: Path, env: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    """`subprocess.run(warm(WORDS))` with what it said, and without the process in between."""
+    environment = {os.fsencode(key): os.fsencode(value) for key, value in env.items()}
+    with (
+        socket.socket(socket.AF_UNIX) as line,
+        Path(os.devnull).open("rb") as nothing,
+        tempfile.TemporaryFile("w+", encoding="utf-8") as out,
+        tempfile.TemporaryFile("w+", encoding="utf-8") as err,
+    ):
+        line.settimeout(PATIENCE_S)  # it ends where the line does
+        line.connect(str(_address()))
+        streams = [stream.fileno() for stream in (nothing, out, err)]
+        ask(line, list(map(str, words)), folder=os.fsencode(cwd), environment=environment, streams=streams)
+        code = int(line.recv(16) or 1)
+        said = [stream.seek(0) or stream.read() for stream in (out, err)]
+    return subprocess.CompletedProcess(words, code, *said)
+
+
+def _address() -> Path:
+    """The server's, which is started where it does not yet serve."""
     address = Path(os.environ[FOLDER]) / "socket"
     if not address.exists():
         _start(address)
-    return [sys.executable, "-S", "-E", str(CLIENT), str(address), *map(str, words)]
+    return address
 
 
 def _start(address: Path) -> None:
