@@ -26,9 +26,12 @@ import time
 import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
+
+import typer.main
 
 from analysis.report import page
 from tests import figure_files
@@ -244,6 +247,10 @@ def main(address: Path, owner: int) -> NoReturn:
             importlib.import_module(name)
     figure_files.leave_out()
     page.write_page(address.parent, "", ())  # which compiles the pages' templates
+    from recoil.cli import app
+
+    typer.main.get_command = cache(typer.main.get_command)
+    typer.main.get_command(app)  # all options of all commands
     being = address.with_name("being-made")
     with socket.socket(socket.AF_UNIX) as door:
         door.bind(str(being))
