@@ -7,9 +7,6 @@ import io
 import json
 import math
 import statistics
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -22,11 +19,11 @@ from experiments.clock import VirtualClock
 from experiments.load import load_setup, shipped_folder
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
+from tests.bids_validator import validated
 from tests.designs import path_of
 
 NAMES = ("detection", "grip", "hurry", "magnitude", "pairs", "realism", "stronger", "voltages")
 PEOPLE = 4
-VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 
 
 @pytest.fixture(scope="module")
@@ -219,6 +216,4 @@ def test_bids_takes_an_exported_design(results, tmp_path):
     for path, content in data_set(runs_of(read_logs([results])), {}, "designs", "0").items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_bytes(content)
-    done = subprocess.run([VALIDATOR, "--json", str(out)], capture_output=True, text=True, check=False)
-    issues = json.loads(done.stdout)["issues"]["issues"]
-    assert [one for one in issues if one["severity"] == "error"] == []
+    assert [one for one in validated(out) if one["severity"] == "error"] == []

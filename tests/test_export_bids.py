@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -25,14 +24,13 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
+from tests.bids_validator import validated
 from tests.conftest import RECOIL, Recoil, refused
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 
-VALIDATOR = RECOIL.with_name("bids-validator-deno")
-NO_NETWORK = {"HTTP_PROXY": "http://127.0.0.1:9", "HTTPS_PROXY": "http://127.0.0.1:9"}
 KNOWN_TO_PEOPLE_ALONE = {
     "Authors",
     "License",
@@ -57,22 +55,6 @@ BREAKS = {
     "participants.tsv": ("\t89\t", "\t94\t", "TSV_VALUE_INCORRECT_TYPE"),
 }
 """What is changed by hand in which file, and what the validator calls it: a wrong column, level, blank, range, age."""
-
-
-def validated(folder: Path, home: Path) -> list[dict[str, Any]]:
-    """What the official validator finds."""
-    done = subprocess.run(
-        [VALIDATOR, folder, "--format", "json", "--max-rows", "-1"],
-        capture_output=True,
-        text=True,
-        env={"PATH": os.environ["PATH"], "HOME": str(home), "NO_COLOR": "1"} | NO_NETWORK,
-        stdin=subprocess.DEVNULL,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-    found: list[dict[str, Any]] = json.loads(done.stdout)["issues"]["issues"]
-    assert (done.returncode != 0) == any(issue["severity"] == "error" for issue in found), done.stderr
-    return found
 
 
 def beyond_people(issues: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -135,7 +117,7 @@ def test_the_official_validator_finds_only_what_people_must_fill_in(recoil: Reco
         done = recoil("export", "bids", real, "--out", "bids", *more)
         assert done.returncode == 1, done
         assert "2 of 6 logs have no journal beside them, as the others have, so nothing proves them: Z9" in done.stderr
-        assert beyond_people(validated(tmp_path / "bids", tmp_path / "home")) == []
+        assert beyond_people(validated(tmp_path / "bids")) == []
 
 
 def test_what_breaks_a_data_set_is_noticed_by_the_validator(exported: Path, tmp_path: Path) -> None:
@@ -144,7 +126,7 @@ def test_what_breaks_a_data_set_is_noticed_by_the_validator(exported: Path, tmp_
         file = tmp_path / "bids" / path
         assert old in file.read_text()
         file.write_text(file.read_text().replace(old, new))
-    found = beyond_people(validated(tmp_path / "bids", tmp_path))
+    found = beyond_people(validated(tmp_path / "bids"))
     for path, (_, _, code) in BREAKS.items():
         assert code in {issue["code"] for issue in found if issue["location"] == f"/{path}"}, path
     assert len({issue["location"] for issue in found}) >= len(BREAKS)
@@ -300,7 +282,7 @@ def test_broken_logs_are_listed_and_the_rest_is_exported(recoil: Recoil, tmp_pat
     counts = json.loads(done.stdout)
     assert len(counts["left_out"]) == 4
     assert (counts["participants"], counts["runs"]) == (2, {"direction": 2, "preference": 1})
-    assert beyond_people(validated(logs / "bids", tmp_path / "home")) == []
+    assert beyond_people(validated(logs / "bids")) == []
 
 
 def test_who_is_excluded_is_left_out_and_their_reason_too(recoil: Recoil, tmp_path: Path) -> None:
