@@ -22,6 +22,8 @@ from experiments.screens.synthetic import synthetic_screen
 from tests.bids_validator import validated
 from tests.designs import path_of
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("detection", "grip", "hurry", "magnitude", "pairs", "realism", "stronger", "voltages")
 PEOPLE = 4
 

@@ -75,6 +75,7 @@ def test_its_table_is_made_again_from_the_journal_byte_for_byte(whole):
     assert contents.plan == finished.plan
 
 
+@pytest.mark.slow
 def test_broken_off_anywhere_and_gone_on_with_it_has_the_same_answers(whole, tmp_path):
     name, finished, lines = whole
     expected = answers(name, rows_of(finished.place.table.read_bytes()))
