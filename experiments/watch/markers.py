@@ -106,10 +106,7 @@ class RunMarkers:
         self._blank = replace(self._blank, record=record.n, at_s=record.monotonic_s)
         match record.kind:
             case "step":
-                self._step = read_as(steps.STEP, record.body, self._place(record))
-                self._since_s = record.monotonic_s
-                if isinstance(self._step, steps.Describe):
-                    self._described.add(self._step.question)
+                self._enter(read_as(steps.STEP, record.body, self._place(record)), record)
                 return None
             case "outcome":
                 return self._of_outcome(read_as(steps.OUTCOME, record.body, self._place(record)), record)
@@ -127,6 +124,13 @@ class RunMarkers:
                 return replace(self._blank, name=name, value=data_of(self._head))
             case "stopped" | "finished":
                 return replace(self._blank, name="stop" if record.kind == "stopped" else "finish")
+            case "measured":  # a sensor's word comes later than its shot, which has a marker
+                return None
+
+    def _enter(self, step: steps.Step, record: Record) -> None:
+        self._step, self._since_s = step, record.monotonic_s
+        if isinstance(step, steps.Describe):
+            self._described.add(step.question)
 
     def _place(self, record: Record) -> str:
         return f"{self._head.path}: line {record.n + 1}"
