@@ -91,8 +91,7 @@ def lab_day(request: RunRequest, languages: tuple[Language, ...]) -> None:
     )
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
-            choice = replace(choice, sensor="" if choice.training else request.sensor)
-            said = _of_the_day(request, study, choice)
+            said = _of_the_day(request, study, replace(choice, sensor="" if choice.training else request.sensor))
             code = "" if choice.training else choice.participant_id
             opening = replace(opening, named="", options=choice.options, language=choice.language.code)
             opening = replace(opening, participant_id=code, said=said)
