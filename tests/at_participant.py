@@ -155,8 +155,11 @@ def link(display, tmp_path_factory):
 @pytest.fixture
 def ask(link, hands, console):
     """Ask, and come back when the question stands on the display. Nothing is left of what was written before."""
-    with pytest.raises(ParticipantError, match="no answer"):
-        link.ask_rating(replace(SCALE, draft=-1), 0.0)
+    show(link, "Please wait")
+    emptied = hands.changing(lambda: console.submit(link.ask_rating, replace(SCALE, draft=-1)))
+    show(link, "Please wait")
+    with pytest.raises(ParticipantError):
+        emptied.result()
 
     def ask(question):
         show(link, "Please wait")

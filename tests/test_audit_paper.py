@@ -130,7 +130,7 @@ def written(folder: Path, text: str) -> Path:
         ('kind = "grim"\nmean = 5.2\nn = 28', 5, "mean"),
         ('kind = "grim"\nmean = "5.2"\nn = 0', 6, "n"),
         ('kind = "grim"\nmean = "5.2"', 1, "n"),
-        ('kind = "guess"', 1, "kind"),
+        ('kind = "guess"', 4, "kind"),
         ('kind = "grim"\nmean = "5.2"\nn = 28\nextra = 1', 7, "extra"),
     ],
 )

@@ -23,7 +23,7 @@ from experiments.watch.server import NICE
 if TYPE_CHECKING:
     from pylsl import StreamInfo
 
-NAME, DETAILS_NAME = "Recoil", "Recoil details"
+MARKERS_NAME, DETAILS_NAME = "Recoil", "Recoil details"
 _LOOK_S = 0.1
 """How long after a look the next one comes. A marker has the time of its event, however late it is sent."""
 CLOCK_S = 1.0
@@ -76,7 +76,7 @@ class MarkerOutlets:
         self._lsl, self._source = pylsl, source
         try:
             self._outlets = [
-                pylsl.StreamOutlet(self._info(NAME, "Markers", ("marker",))),
+                pylsl.StreamOutlet(self._info(MARKERS_NAME, "Markers", ("marker",))),
                 pylsl.StreamOutlet(self._info(DETAILS_NAME, "Details", DETAIL_COLUMNS)),
             ]
         except RuntimeError as error:
@@ -157,7 +157,7 @@ def send_markers(
         try:
             feed = MarkerFeed(folder, say)
             problem = "" if streams.found() else _NOT_FOUND
-            names = (NAME, DETAILS_NAME)
+            names = (MARKERS_NAME, DETAILS_NAME)
             tell(MarkerStreams(folder=str(folder), streams=names, source=source_of(folder), problem=problem))
             while not over.wait(_LOOK_S):
                 _send(streams, feed)
