@@ -116,8 +116,6 @@ class RunMarkers:
                 return self._shot(shot, record, shot.shot)
             case "remark":
                 return self._of_remark(read_as(remarks.REMARK, record.body, self._place(record)), record)
-            case "measured":  # a sensor's word on a shot that has its marker
-                return None
             case "run" | "resumed":
                 name = "begin" if record.kind == "run" else "resume"
                 self._step, self._since_s, self._onset_s = None, record.monotonic_s, math.nan
