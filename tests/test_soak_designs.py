@@ -167,7 +167,8 @@ def test_what_they_leave_is_analysed_drawn_and_exported(place: Path, soak: Soak)
         done = subprocess.run(warm(*command), cwd=place, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     report = (place / "analysis" / "report.md").read_text(encoding="utf-8")
-    drawn = [name for name in DESIGNS if (place / "analysis" / "figures" / f"figure-{name}.png").exists()]
+    figures = {path.stem for path in (place / "analysis" / "figures").glob("*.png")}
+    drawn = [name for name in DESIGNS if any(f"{one}-".startswith(f"figure-{name}-") for one in figures)]
     assert set(drawn) == set(DESIGNS) - {"direction", "preference"}  # their own figures stand under other names
     titles = {load_setup(str(place / "configs" / f"{name}.toml")).config.title for name in drawn}
     assert all(title.rstrip("?") in report for title in titles)
