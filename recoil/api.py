@@ -6,13 +6,14 @@ has errors of its own: parameters that no gun can have are a `ValueError`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from analysis.logs.reading import Logs
     from analysis.paper.audit.run import Audited
+    from analysis.predict.power.grid import PowerRequest
     from analysis.predict.power.results import Power
     from analysis.predict.threshold_plan.run import ThresholdPower
     from analysis.summary.results import StudyStatistics
@@ -196,9 +197,6 @@ def power(
 
     name = file_or_name("config", config)
     counted = None if studies is None else count_of("studies", studies, 10_000_000)
-    others = {"participants": participants, "effects": effects, "methods": methods, "target": target != _TARGET}
-    if (plan := _threshold_plan(name, numbers_of("trials", trials), counted, checked_seed(seed), others)) is not None:
-        return plan
     request = PowerRequest(
         config=name,
         participants=numbers_of("participants", participants),
@@ -209,13 +207,13 @@ def power(
         target=share_argument("target", target),
         seed=checked_seed(seed),
     )
+    if (plan := _threshold_plan(request, counted)) is not None:
+        return plan
     with arguments_named():
         return simulated_power(request)
 
 
-def _threshold_plan(
-    config: str, trials: str | None, people: int | None, seed: int, others: Mapping[str, object]
-) -> ThresholdPower | None:
+def _threshold_plan(request: PowerRequest, people: int | None) -> ThresholdPower | None:
     """The plan of a threshold; `None` of a config that has none."""
     from analysis.predict.threshold_plan.run import (
         OBSERVERS,
@@ -228,12 +226,19 @@ def _threshold_plan(
     from recoil.arguments import arguments_named
 
     with arguments_named():
-        if not procedures_of(config):
+        if not procedures_of(request.config):
             return None
-        if unused := [name for name, given in others.items() if given]:
-            raise ConfigError(
-                f"{', '.join(unused)}: {config} has a threshold, of which only trials and studies are asked"
-            )
+        given = {"participants": request.participants, "effects": request.effects, "methods": request.methods}
+        unused = [name for name, value in given.items() if value]
+        unused += ["target"] if request.target != _TARGET else []
+        if unused:
+            said = f"{request.config} has a threshold, of which only trials and studies are asked"
+            raise ConfigError(f"{', '.join(unused)}: {said}")
         return threshold_power(
-            ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, observers=people or OBSERVERS, seed=seed)
+            ThresholdRequest(
+                config=request.config,
+                trials=request.trials or TRACK_TRIALS,
+                observers=people or OBSERVERS,
+                seed=request.seed,
+            )
         )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pyxdf
 
-from experiments.watch.lsl import DETAILS_NAME, NAME
+from experiments.watch.lsl import DETAILS_NAME, MARKERS_NAME
 from tests.conftest import RECOIL
 from tests.waiting import PATIENCE_S
 
@@ -23,7 +23,7 @@ time.sleep(3.0)
 recording.stop()
 """
 """It takes in what came every half second, and not when it is stopped; its file is whole when it is gone."""
-STREAMS = NAME, DETAILS_NAME
+STREAMS = MARKERS_NAME, DETAILS_NAME
 Row = dict[str, str]
 
 

@@ -204,7 +204,7 @@ def test_what_a_statistic_takes_or_not_is_no_other_error(name: str) -> None:
 
 NUMBERS = frozenset({"a set", "a generator"})
 TAKEN_BY_NOTEBOOKS: Mapping[str, frozenset[str]] = {
-    **dict.fromkeys(("columns", "requests", "order_row", "seed", "return_friction_N"), frozenset({"None"})),
+    **dict.fromkeys(("columns", "requests", "order_row", "seed", "studies", "return_friction_N"), frozenset({"None"})),
     **dict.fromkeys(("participants", "trials"), NUMBERS),
     "effects": NUMBERS,
     "results": frozenset({"a text"}),

@@ -46,6 +46,7 @@ class ShotInHand(HandMechanics):
     peak_hand_force_N: float
     peak_kick_m: float
     max_displacement_m: float
+    turn_s: float | None
     reset_end_s: float | None
     impact_speed_m_s: float | None
     residual_impulse_Ns: float
