@@ -49,11 +49,13 @@ def markers_process(results: Path) -> Iterator[int]:
     """`recoil markers` of a folder, whose streams are there; its process."""
     command = [str(RECOIL), "markers", str(results), "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
-        assert program.stdout.readline() == "{\n"
-        yield program.pid
-        program.send_signal(signal.SIGCONT)
-        program.send_signal(signal.SIGINT)
-        program.communicate(timeout=PATIENCE_S)
+        try:
+            assert program.stdout.readline() == "{\n"
+            yield program.pid
+        finally:
+            program.send_signal(signal.SIGCONT)
+            program.send_signal(signal.SIGINT)
+            program.communicate(timeout=PATIENCE_S)
 
 
 def recorded(xdf: Path) -> tuple[list[tuple[float, str]], list[tuple[float, Row]]]:
