@@ -96,7 +96,7 @@ def paired_scores(
         return PairedScores(model=model, reason=reason)
     found = _fitted(won, tied, model)
     if found is None:
-        return PairedScores(model=model, reason="with so many ties no scores are the best; a few more choices would do")
+        return PairedScores(model=model, reason="with so many ties scores of any size fit alike; more choices that are no ties would tell")
     fit, covariance = found
     basis, people = _basis(len(items)), len(wins_of)
     scores, ses = basis @ fit[: len(items) - 1], _errors(basis, covariance)

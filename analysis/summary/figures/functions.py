@@ -84,11 +84,13 @@ def _own(condition: ConditionFit, who: str, levels: FloatArray) -> _Curve:
 
 
 def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
+    """All people together; no mean threshold is marked where nobody has one within the levels."""
     fits = [one.fit for one in condition.people if one.fit is not None]
+    group = condition.group if any(fit.where == "within" for fit in fits) else None
     return _Curve(
         points=condition.points,
         shares=mean_curve(fits, levels) if fits else None,
-        threshold=None if condition.group is None else condition.group.threshold,
+        threshold=None if group is None else group.threshold,
     )
 
 
