@@ -96,7 +96,8 @@ def paired_scores(
         return PairedScores(model=model, reason=reason)
     found = _fitted(won, tied, model)
     if found is None:
-        return PairedScores(model=model, reason="with so many ties scores of any size fit alike; more choices that are no ties would tell")
+        reason = "with so many ties scores of any size fit alike; more choices without ties would tell"
+        return PairedScores(model=model, reason=reason)
     fit, covariance = found
     basis, people = _basis(len(items)), len(wins_of)
     scores, ses = basis @ fit[: len(items) - 1], _errors(basis, covariance)
