@@ -60,6 +60,11 @@ REFUSED = [
         "procedure.starts: 0.0011 is none of the levels of pulse_s, 0.001 to 0.01",
     ),
     (OTHER, {"procedure": {"down": 1}}, "the rule settles where 0.5 are right, and who feels nothing is right in 0.5"),
+    (
+        OTHER,
+        {"procedure": {"down": 10, "trials": 10, "reversals": 0, "least_trials": 0}},
+        "down = 10 moves the level after 10 answers, and trials",
+    ),
     (OTHER, {"procedure": {"reversals": 40}}, "reversals = 40 takes 81 trials or more, and trials = 50 end a track"),
     (OTHER, {"procedure": {"trials": None}}, "procedure.trials: is missing"),
     (OTHER, {"procedure": {"least_trials": 60}}, "least_trials = 60 is more than trials = 50"),

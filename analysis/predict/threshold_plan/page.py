@@ -71,8 +71,15 @@ def _lines(found: ThresholdPower) -> Iterator[str]:
     digits = _digits(found)
     for trials, best in found.best.items():
         some = {one.procedure: one for one in found.procedures if one.trials == int(trials)}
-        others = "; ".join(_words(one, digits) for name, one in some.items() if name != best)
-        yield f"{trials} trials ({some[best].minutes:.0f} min): take {_words(some[best], digits)}. Others: {others}."
+        least, rest = some.pop(best), "; ".join(_words(one, digits) for one in some.values())
+        alike = [name for name, one in some.items() if _alike(least, one, found.observers)]
+        told = f" Not told apart from it by {found.observers} people: {', '.join(alike)}." if alike else ""
+        yield f"{trials} trials ({least.minutes:.0f} min): take {_words(least, digits)}.{told} Others: {rest}."
+
+
+def _alike(one: ProcedurePower, other: ProcedurePower, people: int) -> bool:
+    """Whether two root mean square errors are within two standard errors, each a share 1/sqrt(2 n) of itself."""
+    return other.rms_error - one.rms_error < 2 * math.hypot(one.rms_error, other.rms_error) / math.sqrt(2 * people)
 
 
 def _words(one: ProcedurePower, digits: int) -> str:

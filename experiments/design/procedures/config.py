@@ -74,6 +74,16 @@ class UpDownConfig(NumericTracksConfig):
             )
         return self
 
+    @model_validator(mode="after")
+    def _can_move(self) -> Self:
+        for name, in_a_row in (("up", self.up), ("down", self.down)):
+            if in_a_row >= self.trials:
+                raise ValueError(
+                    f"{name} = {in_a_row} moves the level after {in_a_row} answers, and trials = {self.trials} end a "
+                    "track before its next: it would never move; ask for fewer, or allow more trials"
+                )
+        return self
+
     @property
     def least_reversal_trials(self) -> int:
         """The fewest trials in which a track can turn so often: it goes either way first, and then turns."""
