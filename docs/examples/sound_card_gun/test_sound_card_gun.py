@@ -1,4 +1,4 @@
-"""The gun keeps what every gun keeps: `pytest`, after `pip install .`."""
+"""The gun keeps what every gun keeps: `pytest`, after `python -m pip install .` in the environment that has Recoil."""
 
 from device.plugin.conformance import broken, conformance, rig_at
 
