@@ -172,15 +172,15 @@ def of_link(found: figures.GunLine, limit_s: float) -> figures.DoctorFinding:
         measured += "" if found.fault is None else f"; fault: {found.fault}"
         return figures.DoctorFinding(check="gun", verdict="fails", measured=measured, advice=advice, figures=found)
     advice = (
-        f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): set the USB "
-        "adapter's latency timer to 1 ms, see below; close other programs"
+        f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): close other "
+        "programs; at a USB serial adapter set its latency timer to 1 ms, see below"
     )
     return _judged("gun", measured, advice if found.round_trip_ms.p95 > 1000 * limit_s else "", found)
 
 
 def of_link_failure(reason: str) -> figures.DoctorFinding:
     """A gun that does not answer."""
-    advice = "check power, cable and port; on Linux you must be in the group dialout"
+    advice = "check power, cable and port; for a serial port you must be in the group dialout on Linux"
     return figures.DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
 
 
