@@ -19,8 +19,8 @@ from tests.waiting import PATIENCE_S
 FIRES, DAMPER, ENDS = "Enter fires:", "Then type d and Enter:", "Enter ends the run:"
 ANSWERS = "fbbffbfb"
 """What the person types, trial after trial, over and over."""
-_ASKED = re.compile(r"[^\n]*\n[^\n]*(?:: |in your own words\. )\Z")
-"""What stands last on the screen when somebody is waited for, with the line above it."""
+_ASKED = re.compile(r"[^\n]*\n[^\n]*(?:(?<!entered): |in your own words\. )\Z")
+"""What stands last on the screen when somebody is waited for, with the line above it; no half of a line."""
 
 
 class AtTerminal:

@@ -79,7 +79,7 @@ def found(results: Path, seconds: float) -> list[pylsl.StreamInfo]:
     return list(pylsl.resolve_bypred(f"starts-with(source_id,'{source_of(results)}')", 2, seconds))
 
 
-@pytest.mark.soak
+@pytest.mark.soak  # twenty seconds, in which LabRecorder is waited for
 def test_a_recording_is_the_journal_row_for_row(quick_configs: Path, tmp_path: Path) -> None:
     shorten(quick_configs)
     results, xdf = tmp_path / "results", tmp_path / "run.xdf"
@@ -108,7 +108,7 @@ def test_a_recording_is_the_journal_row_for_row(quick_configs: Path, tmp_path: P
         assert float(row["uncertainty_s"]) == pytest.approx(within_s, abs=CLOCKS_S)
 
 
-@pytest.mark.soak
+@pytest.mark.slow
 def test_a_run_with_markers_has_its_streams_from_its_begin_to_its_end(quick_configs: Path, tmp_path: Path) -> None:
     shorten(quick_configs)
     run = warm(*words(quick_configs, "--screen", "terminal", "--lsl"))

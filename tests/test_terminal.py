@@ -186,8 +186,10 @@ def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp
             ("pause", "Paused."),
             ("f", "type `go on` and Enter"),
         ):
+            before = len(screen.seen)
             screen.type(line)
             screen.wait_for(shown)
+            assert screen.prompt(before), "what is asked for stands last, whenever it was said that something is saved"
         hand_overs = screen.seen.count(FIRES)
         screen.type("go on")
         screen.wait_for(FIRES, hand_overs + 1)

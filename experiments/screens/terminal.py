@@ -40,8 +40,6 @@ _HALTED = (
 )
 _HOW = {Rate: "a number, or none", Describe: "the words"}
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
-_BESIDE = (events.Flag, events.Note, events.Reason)
-"""What is said beside what is asked, which then stands there anew."""
 _TICK_S = 1.0
 
 
@@ -93,18 +91,20 @@ class TerminalScreen:
     def acknowledge(self, step: Step | None, word: Outcome | Remark) -> None:
         """Say that something is safe; say what the gun failed at."""
         text = texts.saved_text(self._plan, self._live.history if self._live else (), step, word)
-        if text:
+        if text and step is None:
+            self._say_beside(text)
+        elif text:
             self._say(f"  {text}")
 
     def trouble(self, text: str) -> None:
         """Say what went wrong."""
-        self._say(f"\n  {text}")
+        self._say_beside(text)
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
         """Say what the gun itself says after it was told to disarm."""
         disarmed = status is not None and status.state == "disarmed"
         told = f"The gun says nothing ({fault})" if status is None else f"The gun says that it is {status.state}"
-        self._say(f"\n  {told}{'.' if disarmed else ': SWITCH OFF ITS POWER.'}")
+        self._say_beside(f"{told}{'.' if disarmed else ': SWITCH OFF ITS POWER.'}")
 
     # what is asked for
 
@@ -194,7 +194,6 @@ class TerminalScreen:
         verdict = self._live.offer(event, press)
         if verdict.text:
             self._say(f"  {verdict.text}")
-        if verdict.text or isinstance(event, _BESIDE):
             self._show(self.text(self._live.position))
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
@@ -223,6 +222,12 @@ class TerminalScreen:
 
     def _say(self, text: str) -> None:
         self._show(f"{text}\n")
+
+    def _say_beside(self, text: str) -> None:
+        """Say what comes whenever it comes; what is asked for then stands there anew, and last."""
+        with self._lock:
+            still = self._live is not None and self._live.position.serial == self._shown.serial
+            self._show(f"\n  {text}\n{self.text(self._shown) if still else ''}")
 
     def _show(self, text: str) -> None:
         try:
