@@ -182,7 +182,7 @@ class Watcher:
 def program(case: str, folder: Path) -> dict[str, Any]:
     """One run at a console worked by a synthetic participant: the longest stall, and what happened."""
     from experiments.screens.console.app import Console
-    from experiments.screens.console.live import VisualParticipant
+    from experiments.screens.console.visual_participant import VisualParticipant
 
     guns, stopped = faulty_guns(case), None
     syncs = threading.Event()
