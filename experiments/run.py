@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from device import Gun, open_gun
-from experiments.catalogues.catalogue import ENGLISH, Language
+from experiments.catalogues.catalogue import ENGLISH, Language, language
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -31,10 +31,12 @@ from experiments.record.journal import (
     Journal,
     JournalError,
     ParticipantKind,
+    ShownLanguage,
     begun,
     hold_journal,
     read_journal,
 )
+from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.runner import Desk, carry_out, gun_name
@@ -90,7 +92,7 @@ class RunRequest:
     it. A `practice` is not analysed: it has files of its own and can be done again; nothing of a `training` is kept.
     `anew_reason` is why an unfinished run is set aside for a fresh one: for the register and the head of the new
     journal. At the console the participant may have `options` of their own, and a `visual` run is worked by a
-    synthetic one. `language` is the participant's.
+    synthetic one. `language` is the participant's; `catalogues` is where else there are languages.
     """
 
     setup: Setup[DesignConfig]
@@ -107,6 +109,7 @@ class RunRequest:
     visual: bool = False
     options: ParticipantOptions = ParticipantOptions()
     language: Language = ENGLISH
+    catalogues: Path | None = None
 
     @property
     def simulated(self) -> bool:
@@ -319,6 +322,24 @@ def _check_same_language(before: Contents, request: RunRequest) -> None:
             f"{before.path}: the run began with another catalogue {code} than there is now; resume with the one it "
             "began with (--catalogues DIR), or start anew (--fresh)"
         )
+
+
+def language_begun_in(request: RunRequest) -> ShownLanguage | None:
+    """The language of the run that is there, by its journal; `None` where it is English, or nothing is on record."""
+    where = folders.place(request.results, request.participant_id, request.setup.config.experiment)
+    head = journal_head(where.journal) if where.journal.exists() else None
+    return None if head is None else head.language
+
+
+def gone_on_with(request: RunRequest) -> RunRequest:
+    """A request that goes on with a run, in that run's language: that it may be used was said when the run began.
+
+    `ConfigError`, if its catalogue is not there any more.
+    """
+    if request.again != "resume":
+        return request
+    began = language_begun_in(request)
+    return replace(request, language=ENGLISH if began is None else language(began.code, request.catalogues))
 
 
 def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:

@@ -20,7 +20,7 @@ from experiments.live_run import RunStopped, Screen
 from experiments.rebuild import rebuild, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
-from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, run
+from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, language_begun_in, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered
@@ -59,7 +59,7 @@ def run_session(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
         raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
         _check_resumable(request)
-    request = replace(request, language=wanted.language(wanted.code or _began_in(request)))
+    request = replace(request, language=_language(request, wanted), catalogues=wanted.folder)
     _check_terminal(request)
     _say_beforehand(request)
     try:
@@ -124,14 +124,17 @@ def _check_same_kind(request: RunRequest, where: Place) -> None:
         )
 
 
-def _began_in(request: RunRequest) -> str:
-    """The language of a run that nobody names: that which it began in, else that of its design."""
-    contents = None
-    if request.again == "resume":
-        contents = begun(place(request.results, request.participant_id, request.setup.config.experiment).journal)
-    if contents is None:
-        return request.setup.config.language
-    return ENGLISH.code if contents.head.language is None else contents.head.language.code
+def _language(request: RunRequest, wanted: LanguageOptions) -> Language:
+    """That which was asked for, else that which the run began in, else that of its design. `ConfigError`: not allowed.
+
+    That nobody has checked it was accepted when the run began, if its journal says so.
+    """
+    began = language_begun_in(request) if request.again == "resume" else None
+    own = request.setup.config.language if began is None else began.code
+    code = own if wanted.code is None else wanted.code
+    if began is not None and began.code == code and not began.checked_by:
+        return language(code, wanted.folder)
+    return wanted.language(code)
 
 
 def _check_terminal(request: RunRequest) -> None:
@@ -211,7 +214,8 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
             "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"
         )
     check_pace("console", request.gun)
-    request = replace(request, language=wanted.language(wanted.code or request.setup.config.language))
+    code = request.setup.config.language if wanted.code is None else wanted.code
+    request = replace(request, language=wanted.language(code), catalogues=wanted.folder)
     _say_beforehand(request)
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow

@@ -4,7 +4,9 @@ Each text can still be read by whoever wrote it, so that a text that did not com
 """
 
 import io
+import json
 import re
+from itertools import starmap
 
 from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po
@@ -37,15 +39,25 @@ SAID = {LONG: in_long, RIGHT_TO_LEFT: in_right_to_left}
 
 
 def write_catalogue(folder, code, say, head, but=()):
-    """A catalogue of every text in the template but some, compiled; gives back its file."""
+    """A catalogue of every text in the template but some; gives back its file."""
     place = folder / code / "LC_MESSAGES"
     place.mkdir(parents=True, exist_ok=True)
     with (SHIPPED / f"{DOMAIN}.pot").open("rb") as file:
         texts = [one.id for one in read_po(file) if one.id and one.id not in but]
+    entries = {"": head_of(code, head)} | {one: say(one) for one in texts}
+    (place / f"{DOMAIN}.po").write_text("\n".join(starmap(po_entry, entries.items())), encoding="utf-8")
+    return place / f"{DOMAIN}.po"
+
+
+def head_of(code, head):
+    """The lines that stand for the empty text."""
     lines = {"Language": code, "Content-Type": "text/plain; charset=utf-8", **head}
-    entries = {"": "".join(f"{name}: {value}\n" for name, value in lines.items())} | {one: say(one) for one in texts}
-    (place / f"{DOMAIN}.mo").write_bytes(compiled(entries))
-    return place / f"{DOMAIN}.mo"
+    return "".join(f"{name}: {value}\n" for name, value in lines.items())
+
+
+def po_entry(text, said):
+    """A text and what is said for it, as a `.po` has them."""
+    return f"msgid {json.dumps(text, ensure_ascii=False)}\nmsgstr {json.dumps(said, ensure_ascii=False)}\n"
 
 
 class _Entries(list):

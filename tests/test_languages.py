@@ -1,6 +1,7 @@
 """The participant's language: what is in the catalogues, which are refused, and what a run in one of them records."""
 
 import ast
+import io
 import json
 import re
 import runpy
@@ -9,7 +10,10 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from babel.messages.pofile import read_po
+from babel.messages.catalog import Catalog
+from babel.messages.pofile import read_po, write_po
+from hypothesis import given
+from hypothesis import strategies as st
 
 from analysis.logs.journals import RunFile
 from analysis.summary.languages import unchecked_languages
@@ -23,9 +27,11 @@ from experiments.catalogues.catalogue import (
     SHIPPED,
     check_allowed,
     language,
+    languages,
 )
 from experiments.catalogues.fonts import font_for
 from experiments.catalogues.messages import ParticipantMessages, notes, placeholders
+from experiments.catalogues.po import texts_of_po
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.design.config import DesignConfig
@@ -34,7 +40,7 @@ from experiments.design.shown_texts import letters_of, setup_in, shown_texts, te
 from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.load import load_setup
 from experiments.record.journal import read_journal
-from experiments.run import RunRequest, run
+from experiments.run import RunRequest, gone_on_with, run
 from experiments.screens import texts
 from experiments.screens.participant import messages as wire
 from experiments.screens.synthetic import synthetic_screen
@@ -79,7 +85,7 @@ def test_the_template_of_the_consoles_captions_is_as_the_console_has_them():
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.parts[-3])
-def test_what_is_compiled_is_what_stands_in_the_source(source):
+def test_a_catalogue_that_comes_along_is_read_as_babel_reads_it(source):
     with source.open("rb") as file:
         texts = {one.id: one.string for one in read_po(file) if one.id}
     found = language(source.parts[-3])
@@ -155,10 +161,21 @@ def test_a_catalogue_with(say, head, but, said, tmp_path):
     assert str(refused.value).startswith(str(tmp_path))
 
 
-@pytest.mark.parametrize("data", [b"", b"no catalogue", b"\xde\x12\x04\x95", b"\xde\x12\x04\x95" + b"\xff" * 40])
-def test_bytes_that_are_no_catalogue_are_refused_by_name(data, tmp_path):
-    write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG]).write_bytes(data)
-    with pytest.raises(ConfigError, match=r"recoil\.mo: it is no compiled catalogue"):
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (b"<<<<<<< HEAD\n", r"recoil\.po: line \d+: '<<<<<<< HEAD' is no line of a \.po"),
+        (b'msgid "again"\n', r"recoil\.po: line \d+: an entry without its msgstr"),
+        (b'msgstr "alone"\n', r"recoil\.po: line \d+: an entry without its msgid"),
+        (b'msgid "Done"\nmsgstr "twice"\n', r"recoil\.po: line \d+: 'Done' stands there a second time"),
+        (b'msgid "x"\nmsgstr "\\q"\n', r"recoil\.po: line \d+: \\q is none of "),
+        (b"# \xd6\n", r"recoil\.po: is not UTF-8 \(byte \d+\); save it as UTF-8"),
+    ],
+)
+def test_a_source_with_what_cannot_be_read_is_refused_by_file_and_line(more, said, tmp_path):
+    path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
+    path.write_bytes(path.read_bytes() + b"\n" + more)
+    with pytest.raises(ConfigError, match=said):
         language(LONG, tmp_path)
 
 
@@ -166,8 +183,86 @@ def test_bytes_that_are_no_catalogue_are_refused_by_name(data, tmp_path):
 def test_a_catalogue_that_is_cut_off_is_refused(cut, tmp_path):
     path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
     path.write_bytes(path.read_bytes()[:cut])
-    with pytest.raises(ConfigError, match=r"recoil\.mo: "):
+    with pytest.raises(ConfigError, match=r"recoil\.po"):
         language(LONG, tmp_path)
+
+
+def compiled_alone(path):
+    """The catalogue of a source as a `.mo`; the source is gone."""
+    path.with_suffix(".mo").write_bytes(compiled(texts_of_po(path.read_text(encoding="utf-8"))))
+    path.unlink()
+    return path.with_suffix(".mo")
+
+
+def test_a_compiled_catalogue_counts_where_it_has_no_source_and_never_before_it(tmp_path):
+    path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
+    of_source = language(LONG, tmp_path)
+    of_compiled = compiled_alone(path)
+    alone = language(LONG, tmp_path)
+    assert (alone.messages, alone.fonts, alone.name) == (of_source.messages, of_source.fonts, of_source.name)
+    of_compiled.write_bytes(b"no catalogue")
+    with pytest.raises(ConfigError, match=r"recoil\.mo: is no compiled catalogue .* put the \.po"):
+        language(LONG, tmp_path)
+    write_catalogue(tmp_path, LONG, lambda text: f"{text} now", HEADS[LONG])
+    assert language(LONG, tmp_path).messages.wait == "Please wait. now"
+
+
+def test_a_labs_catalogue_without_anything_compiled_is_used_and_one_of_a_shipped_language_comes_first(tmp_path):
+    own = write_catalogue(tmp_path, "zh", SAID[LONG], HEADS[LONG])
+    assert languages(tmp_path) == {"en": None, "zh": own}
+    assert language("zh", tmp_path).messages.wait == SAID[LONG]("Please wait.")
+
+
+@pytest.mark.parametrize("code", ["", " ", "../zh", "中"])
+def test_a_code_that_is_none_is_refused_by_name(code):
+    with pytest.raises(ConfigError, match=re.escape(f"--language {code!r}: must be a language's code, such as zh")):
+        language(code)
+    with pytest.raises(ConfigError, match=re.escape(f"--language {code!r}")):
+        run_session(
+            RunRequest(setup=load_setup("preference"), participant_id="P01", results=Path("none")),
+            LanguageOptions(code=code),
+        )
+
+
+SHOWN = st.text(
+    st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"]) | st.sampled_from('\n\t\r"\\'), min_size=1
+)
+
+
+@given(st.dictionaries(SHOWN, SHOWN, max_size=5), st.sampled_from([0, 20]))
+def test_a_source_is_read_as_babel_writes_it(said, width):
+    made = Catalog()
+    for text, other in said.items():
+        made.add(text, other)
+    out = io.BytesIO()
+    write_po(out, made, width=width)
+    assert {text: found for text, found in texts_of_po(out.getvalue().decode()).items() if text} == said
+
+
+def test_what_is_fuzzy_has_a_context_or_plurals_or_is_obsolete_is_not_translated():
+    source = """#, fuzzy
+msgid ""
+msgstr "Language: de\\n"
+
+#, fuzzy, python-format
+msgid "one"
+msgstr "eins"
+msgctxt "menu"
+msgid "two"
+msgstr "zwei"
+msgid "{n} thing"
+msgid_plural "{n} things"
+msgstr[0] "ein Ding"
+msgstr[1] "Dinge"
+msgid "four"
+msgstr ""
+"vi"
+"er"
+#~ msgid "five"
+#~ msgstr "fünf"
+"""
+    assert texts_of_po(source) == {"": "Language: de\n", "four": "vier"}
+    assert texts_of_po(source.replace("\n", "\r\n")) == texts_of_po(source)
 
 
 # a design's texts
@@ -378,9 +473,45 @@ def test_the_languages_to_choose_from_are_the_checked_ones_unless_it_is_said_oth
     assert offered(True) == {"en", LONG, RIGHT_TO_LEFT, "zh"}
 
 
+@pytest.mark.parametrize("code", [None, "zh"])
+def test_that_nobody_has_checked_a_language_is_accepted_once_a_run(code, tmp_path):
+    begun = carried_out(tmp_path, language("zh"))
+    cut(begun)
+    request = resuming(tmp_path)
+    with pytest.raises(ConfigError, match="no native speaker"):  # another run of theirs is to be accepted anew
+        run_session(replace(request, again="fresh"), LanguageOptions(code="zh"))
+    place = run_session(request, LanguageOptions(code=code))
+    assert read_journal(place.journal).finished
+    assert list(unchecked_languages([run_file(place, "P01")]))
+
+
+def test_a_run_that_began_in_a_checked_language_is_asked_about_once_nobody_vouches_for_it(tmp_path, folder):
+    own = write_pseudo_languages(tmp_path / "own")
+    cut(carried_out(tmp_path, language(LONG, own)))
+    write_catalogue(own, LONG, SAID[LONG], HEADS[LONG] | {CHECKED_BY: "nobody"})
+    with pytest.raises(ConfigError, match="no native speaker"):
+        run_session(resuming(tmp_path), LanguageOptions(folder=own))
+
+
+def test_at_the_console_a_run_is_gone_on_with_in_its_own_language_whatever_stands_in_the_window(tmp_path, folder):
+    cut(carried_out(tmp_path, language("zh")))
+    assert gone_on_with(replace(resuming(tmp_path), language=language(LONG, folder))).language.code == "zh"
+    cut(carried_out(tmp_path / "own", language(LONG, folder)))
+    own = replace(resuming(tmp_path / "own"), catalogues=folder)
+    assert gone_on_with(own).language.messages == language(LONG, folder).messages
+    with pytest.raises(ConfigError, match="no catalogue of that name"):
+        gone_on_with(replace(own, catalogues=None))
+    cut(carried_out(tmp_path / "english", ENGLISH))
+    assert gone_on_with(replace(resuming(tmp_path / "english"), language=language("zh"))).language is ENGLISH
+
+
+def resuming(results):
+    return RunRequest(setup=load_setup("preference"), participant_id="P01", results=results, again="resume")
+
+
 def test_a_resumed_run_goes_on_in_its_own_language_without_being_told(tmp_path, folder):
     cut(carried_out(tmp_path, language(LONG, folder)))
-    request = RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, again="resume")
+    request = resuming(tmp_path)
     place = run_session(request, LanguageOptions(folder=folder))
     assert read_journal(place.journal).finished
     with pytest.raises(ConfigError, match="no catalogue of that name"):

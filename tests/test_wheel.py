@@ -42,7 +42,7 @@ def test_the_wheel_holds_the_four_packages_and_the_configs_and_nothing_else(whee
         "experiments/screens/console/console.qss",
         "experiments/catalogues/recoil.pot",
         "experiments/catalogues/zh/LC_MESSAGES/recoil.po",
-        "experiments/catalogues/zh/LC_MESSAGES/recoil.mo",
+        "experiments/catalogues/zh/LC_MESSAGES/recoil.po",
     ):
         assert name in names
     assert any(name.endswith(".dist-info/licenses/LICENSE") for name in names)

@@ -1,22 +1,25 @@
-"""Languages from gettext catalogues: folders LANGUAGE/LC_MESSAGES with `recoil.po` and `recoil.mo`, shipped or own.
+"""Languages from gettext catalogues: folders LANGUAGE/LC_MESSAGES with a `recoil.po`, shipped or own.
 
-What says more than texts stands in the head of the `.po`: the language's own name, its fonts, its direction, and who
-has checked it. A catalogue is used whole or not at all.
+The `.po` is read as it stands, so that nothing compiled can be older; a `recoil.mo` counts where there is no `.po`.
+What says more than texts stands in the head: the language's own name, its fonts, its direction, and who has checked
+it. A catalogue is used whole or not at all.
 """
 
 from __future__ import annotations
 
 import gettext
+import io
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages, translated
+from experiments.catalogues.po import texts_of_po
 from experiments.config.door import ConfigError, printable
-from experiments.config.findings import LANGUAGE_CODE
+from experiments.config.findings import LANGUAGE_CODE, PATTERNS
 
 SHIPPED = Path(__file__).parent
 DOMAIN = "recoil"
@@ -24,6 +27,7 @@ NAME, FONTS, DIRECTION, CHECKED_BY = "X-Language-Name", "X-Fonts", "X-Direction"
 """The entries in the head of a catalogue that say what gettext does not ask for."""
 NOBODY = "nobody"
 """What the last of them says, where no native speaker has checked the catalogue."""
+_COMPILED = ".mo"
 
 
 def _nothing(_: str) -> str:
@@ -59,15 +63,20 @@ def languages(folder: Path | None = None) -> dict[str, Path | None]:
     """The languages that there are, with their files: a lab's before those that come along. English has none."""
     found: dict[str, Path | None] = {ENGLISH.code: None}
     for place in filter(None, (SHIPPED, folder)):
-        found |= {path.parts[-3]: path for path in sorted(place.glob(f"*/LC_MESSAGES/{DOMAIN}.mo"))}
+        for kind in (_COMPILED, ".po"):
+            found |= {path.parts[-3]: path for path in sorted(place.glob(f"*/LC_MESSAGES/{DOMAIN}{kind}"))}
     return found
 
 
 def language(code: str, folder: Path | None = None) -> Language:
     """A language by its code. `ConfigError`: there is none, or its catalogue cannot be used, and why."""
     if folder is not None and not folder.is_dir():
-        raise ConfigError(f"--catalogues {folder}: no such folder; it must hold LANGUAGE/LC_MESSAGES/{DOMAIN}.mo")
+        raise ConfigError(f"--catalogues {folder}: no such folder; it must hold LANGUAGE/LC_MESSAGES/{DOMAIN}.po")
     known = languages(folder)
+    if not re.match(LANGUAGE_CODE, code):
+        raise ConfigError(
+            f"--language {code!r}: must be {PATTERNS[LANGUAGE_CODE]}; there are {', '.join(sorted(known))}"
+        )
     if code not in known:
         where = "" if folder is None else f" here or in {folder}"
         raise ConfigError(
@@ -83,7 +92,7 @@ def check_allowed(one: Language, *, unchecked: bool) -> None:
     if not one.checked_by and not unchecked:
         raise ConfigError(
             f"--language {one.code}: no native speaker has checked it ({CHECKED_BY} in the head of its .po names "
-            "nobody); have it checked and compiled again, or add --unchecked: journal and report will say so"
+            "nobody); have it checked, or add --unchecked: journal and report will say so"
         )
 
 
@@ -97,13 +106,39 @@ class _Absent(gettext.NullTranslations):
 
 def _read(code: str, path: Path) -> Language:
     try:
-        with path.open("rb") as file:
-            catalogue = gettext.GNUTranslations(file)
-        catalogue.add_fallback(_Absent())
-        return _language(code, catalogue)
+        return _language(code, *(_compiled(path) if path.suffix == _COMPILED else _of_source(path)))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        how = (
+            "put the .po that it was made from beside it, and mend that"
+            if path.suffix == _COMPILED
+            else "mend it there"
+        )
+        raise ConfigError(f"{path}: {error}; {how}") from error
+
+
+_Texts = tuple[Mapping[str, str], Callable[[str], str]]
+"""The head of a catalogue, by names in small letters, and what gives a text in its language, empty if it has none."""
+
+
+def _of_source(path: Path) -> _Texts:
+    try:
+        texts = texts_of_po(path.read_bytes().decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"is not UTF-8 (byte {error.start}); save it as UTF-8") from error
+    lines = (line.partition(":") for line in texts.pop("", "").split("\n"))
+    return {name.strip().lower(): value.strip() for name, _, value in lines}, lambda text: texts.get(text, "")
+
+
+def _compiled(path: Path) -> _Texts:
+    data = path.read_bytes()
+    try:
+        catalogue = gettext.GNUTranslations(io.BytesIO(data))
     except (OSError, ValueError, struct.error, IndexError) as error:  # what gettext raises for bytes that are none
-        why = f"it is no compiled catalogue ({error})" if not isinstance(error, _Unfit) else str(error)
-        raise ConfigError(f"{path}: {why}; mend the .po beside it and compile it anew") from error
+        raise ValueError(f"is no compiled catalogue ({error})") from error
+    catalogue.add_fallback(_Absent())
+    return catalogue.info(), catalogue.gettext
 
 
 _JOINERS = str.maketrans("", "", "\u200c\u200d")
@@ -120,31 +155,22 @@ def _printed(translate: Callable[[str], str], text: str) -> str:
     return found
 
 
-class _Unfit(ValueError):  # noqa: N818 - what is so of a catalogue that can be read
-    """A catalogue that lacks something; the message says what."""
-
-
-def _language(code: str, catalogue: gettext.GNUTranslations) -> Language:
-    head = catalogue.info()
+def _language(code: str, head: Mapping[str, str], say: Callable[[str], str]) -> Language:
     own, direction = head.get("language", ""), head.get(DIRECTION.lower(), "ltr")
     if own != code or not re.match(LANGUAGE_CODE, code):
-        raise _Unfit(f"its head says Language: {own or 'nothing'}, and its folder {code}; they must be one code")
+        raise ValueError(f"its head says Language: {own or 'nothing'}, and its folder {code}; they must be one code")
     if direction not in ("ltr", "rtl"):
-        raise _Unfit(f"{DIRECTION}: {direction}; it must be ltr or rtl")
+        raise ValueError(f"{DIRECTION}: {direction}; it must be ltr or rtl")
     fonts = tuple(filter(None, (font.strip() for font in head.get(FONTS.lower(), "").split(","))))
     if not fonts:
-        raise _Unfit(f"{FONTS} is missing in its head; name the font families that have its letters, with commas")
-    look_up = partial(_printed, catalogue.gettext)
-    try:
-        messages = translated(look_up)
-    except ValueError as error:
-        raise _Unfit(str(error)) from error
+        raise ValueError(f"{FONTS} is missing in its head; name the font families that have its letters, with commas")
+    look_up = partial(_printed, say)
     return Language(
         code=code,
         name=head.get(NAME.lower(), "") or code,
         fonts=fonts,
         right_to_left=direction == "rtl",
         checked_by="" if (name := head.get(CHECKED_BY.lower(), NOBODY)) == NOBODY else name,
-        messages=messages,
+        messages=translated(look_up),
         look_up=look_up,
     )

@@ -370,6 +370,7 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
         last_utc=contents.records[-1].utc,
         methods=order_shown(began_with(head), plan),
         data=data_of(head),
+        language="" if head.language is None else f"{head.language.code} ({head.language.name})",
     )
 
 

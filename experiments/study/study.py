@@ -37,7 +37,7 @@ class RunProgress:
 
     `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run, and whose
     `data` they are. All five are empty where no run has begun, or where its journal cannot be read. `practised`: a
-    practice was done to its end.
+    practice was done to its end. `language`: the participant's, where that is not English.
     """
 
     experiment: str
@@ -48,6 +48,7 @@ class RunProgress:
     methods: tuple[str, ...] = ()
     data: DataKind | None = None
     practised: bool = False
+    language: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,7 @@ from experiments.design.shown_texts import setup_in
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.run import Again, Finished, RunRequest, UnfinishedRun
+from experiments.run import Again, Finished, RunRequest, UnfinishedRun, gone_on_with
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import Opening, monitors
@@ -52,7 +52,7 @@ def run_live(request: RunRequest, *, band: str = "", last: str = THANK_PARTICIPA
         decided = None if request.visual else ask_about(request, found)
         if decided is None:
             raise
-        return _carry_out(decided, band, last)
+        return _carry_out(gone_on_with(decided), band, last)
 
 
 def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
@@ -81,6 +81,7 @@ def lab_day(request: RunRequest, languages: tuple[Language, ...]) -> None:
     )
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
+            choice = replace(choice, catalogues=request.catalogues)
             said = _of_the_day(request, study, replace(choice, sensor="" if choice.training else request.sensor))
             code = "" if choice.training else choice.participant_id
             opening = replace(opening, named="", options=choice.options, language=choice.language.code)
@@ -113,7 +114,7 @@ def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest) -> 
         results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
         try:
             band, last = _band_and_last(study, choice)
-            run_live(replace(choice, seed=request.seed, results=results), band=band, last=last)
+            run_live(gone_on_with(replace(choice, seed=request.seed, results=results)), band=band, last=last)
         except RunStopped as stop:
             return _stopped(choice, str(stop))
         except RecoilError as error:

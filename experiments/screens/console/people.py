@@ -29,7 +29,8 @@ def note_text(person: Participant) -> str:
 def stopped_text(code: str, run: RunProgress) -> str:
     """When an unfinished run stopped, and how far it had come."""
     when, counts = date_text(run.last_utc), f"{run.answered} of {run.planned}"
-    return f"{code} stopped {run.experiment} on {when} with {counts} trials answered."
+    spoken = f", in {run.language}" if run.language else ""
+    return f"{code} stopped {run.experiment} on {when} with {counts} trials answered{spoken}."
 
 
 def coming_text(seen: Overview) -> str:
