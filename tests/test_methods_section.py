@@ -44,7 +44,7 @@ def test_what_nesting_makes_differ_is_told_of_every_group_and_session():
     text = "\n".join(methods_section(nested, runs))
     assert "There were 2 or 3 sessions, each of one voltage in V" in text
     assert "In each session every condition came once, in random order: 2 trials." in text
-    assert "The 4 or 6 trials took" in text
+    assert "The 4 or 6 trials took 4 or 6 s as planned." in text
 
 
 @pytest.mark.parametrize(

@@ -293,10 +293,17 @@ def test_without_backward_trials_there_is_no_d_prime_and_no_published_pattern(tm
     assert not any("d′" in claim or "backward" in claim for claim in claims)
 
 
-@pytest.mark.parametrize("name", ["voltages", "pairs", "magnitude", "grip"])
+@pytest.mark.parametrize("name", ["voltages", "magnitude", "grip"])
 def test_a_design_that_asks_something_else_has_no_power(name: str) -> None:
     with pytest.raises(ConfigError, match=f"{name}\\.toml: .*simulate others run by run: --screen synthetic"):
         make_grid(PowerRequest(config=name))
+
+
+def test_power_of_paired_comparisons_says_what_to_do_instead() -> None:
+    with pytest.raises(
+        ConfigError, match=r"pairs\.toml: studies of paired comparisons are not drawn; simulate as many"
+    ):
+        make_grid(PowerRequest(config="pairs"))
 
 
 def test_a_design_without_synthetic_people_has_no_power(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 from analysis.predict.check_design import check_design
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
+from experiments.design.planned import planned_run
 from experiments.design.planning import plan_of, practice_of
 from experiments.design.procedures.choosing import ChosenLevels, posterior_rule, tracks_of_cell
 from experiments.design.procedures.config import PosteriorConfig
@@ -87,12 +88,28 @@ REFUSED = [
     (OTHER, {"procedure": {"steps": [0.01]}}, "procedure.steps: 0.01 goes through all of pulse_s, 0.001 to 0.01"),
     (OTHER, {"procedure": {"ratio": 1e5}}, "procedure.ratio = 100000: a step up of 0.001 goes through all"),
     (OTHER, {"procedure": {"ratio": 1e5, "steps": [2.0], "step_as": "factor"}}, "procedure.ratio = 100000: a step up"),
+    (
+        OTHER,
+        {"procedure": {**SHRINKING, "first_step": 0.001, "target": 0.999}},
+        "procedure.target = 0.999: a track of 50 trials would hardly ever turn there; from 0.52 to 0.98 it does",
+    ),
+    (OTHER, {"procedure": {**SHRINKING, "first_step": 0.001, "target": 0.4}}, "who feels nothing is right in 0.5"),
+    (
+        OTHER,
+        {"procedure": {**SHRINKING, "first_step": 0.001, "trials": 3, "reversals": 0, "least_trials": 0}},
+        "procedure.trials = 3 are too few for any target",
+    ),
     (OTHER, {"procedure": {**SHRINKING, "first_step": 1e-5}}, "first_step = 1e-05 is smaller than the grain"),
     (OTHER, {"procedure": {**SHRINKING, "first_step": 5.0}}, "first_step = 5 goes through all of pulse_s"),
     (OTHER, {"procedure": {**SHRINKING, "first_step": 5.0, "step_as": "factor"}}, "first_step = 5 goes through all of"),
     (OTHER, {"factors": {"pulse_s": {"levels": {"minimum": 0.02}}}}, "minimum = 0.02 is not below maximum = 0.01"),
     (OTHER, {"factors": {"pulse_s": {"levels": {"grain": 1e-320}}}}, "make far too many levels; they must make 2 to"),
     (ONE, {"procedure": {"threshold": {"minimum": 21.0, "maximum": 25.0}}}, "21 to 25, holds none of the levels"),
+    (
+        ONE,
+        {"procedure": {"threshold": {"minimum": -5.0}}},
+        "procedure.threshold.minimum = -5: no voltage_V is below 0; begin at 0 or above",
+    ),
     (ONE, {"procedure": {"width": {"minimum": 0.0}}}, "width.minimum = 0 must be above 0"),
     (ONE, {"procedure": {"lapse": {"minimum": 0.0, "maximum": 0.6, "points": 3}}}, "leave nothing to feel"),
     (ONE, {"procedure": {"guess": {"minimum": 0.0, "maximum": 0.1, "points": 2}}}, "who feels nothing is right in 0.5"),
@@ -189,6 +206,16 @@ def test_a_plan_has_a_track_for_each_cell_and_start_and_no_level_of_what_is_chos
     assert rounds == [{1, 2}] * 40
 
 
+def test_a_factor_that_was_forgotten_is_named_where_its_tracks_make_too_many_trials() -> None:
+    levels = {"minimum": 0.004, "maximum": 0.01, "grain": 0.001}
+    for breaks_s, words in ((20.0, "140 trials without a break"), (0.0, "560 trials without a break")):
+        design = changed(
+            "threshold", factors={"pulse_s": {"levels": levels}}, breaks={"between_sets_s": breaks_s}
+        ).config
+        with pytest.raises(ConfigError, match=f"{words}.* each level of pulse_s has tracks of its own"):
+            planned_run(design, plan_of(design, "P01", 1))
+
+
 def test_tracks_come_one_after_another_where_the_design_says_so() -> None:
     plan = plan_of(changed("staircase", procedure={"interleave": False}).config, "P01", 1)
     tracks = [trial.track for trial in plan.trials]
@@ -210,7 +237,7 @@ def test_check_says_how_long_it_takes_at_the_least_and_at_the_most() -> None:
     found = check_design(STAIRCASE, 1, ["P01"])
     assert (found.least_trials, found.trials) == (42, 100)  # 10 reversals are 11 moves: 6 of one trial, 5 of three
     assert found.least_duration_s == pytest.approx(42 * 10.0)
-    assert "42 trials and 7 min at the least, 100 trials and 17.17 min at the most" in " ".join(found.text)
+    assert "42 trials and 7 min at the least, 100 trials and 17 min at the most" in " ".join(found.text)
     assert "3 down, 1 up, towards 79.4 %" in found.text[0]
 
 

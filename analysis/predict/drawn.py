@@ -124,6 +124,12 @@ def drawn_question(setup: Setup[DesignConfig]) -> tuple[str, Law]:
     if not isinstance(laws, SyntheticAnswers):
         raise ConfigError(f"{setup.source}: synthetic is missing; it names the file that says how people answer")
     name = next((name for name in design.questions if _is_direction(design, name) or _is_rating(design, name)), None)
+    if name is None and design.trial.kind == "pair":
+        raise ConfigError(
+            f"{setup.source}: studies of paired comparisons are not drawn; simulate as many people as you think of, "
+            "each by recoil run CONFIG --participant CODE --screen synthetic --results DIR; then recoil analyze DIR "
+            "says how wide the intervals of the scores are"
+        )
     if name is None:
         raise ConfigError(
             f"{setup.source}: studies are drawn of designs that ask which way the gun shot, one method a session, or "

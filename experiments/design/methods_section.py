@@ -118,13 +118,13 @@ _HOW: dict[BlockOrder, str] = {
 }
 
 
-def _counts(numbers: Iterable[float], unit: float = 1.0) -> str:
+def _counts(numbers: Iterable[float]) -> str:
     """A number, or those that there are.
 
     >>> _counts([2, 2]), _counts([3, 2]), _counts([2, 3, 5])
     ('2', '2 or 3', '2 to 5')
     """
-    found = [f"{number / unit:.4g}" for number in sorted(set(numbers))]
+    found = [f"{number:g}" for number in sorted(set(numbers))]
     return f"{found[0]} to {found[-1]}" if len(found) > 2 else " or ".join(found)
 
 
@@ -246,10 +246,23 @@ def _rests(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
         yield f"Sets were {breaks.between_sets_s:g} s apart."
     if breaks.between_sessions_s and any(run.sessions > 1 for run in runs):
         yield f"Sessions were {breaks.between_sessions_s:g} s apart."
-    trials, minutes = _counts([run.trials for run in runs]), _counts([run.duration_s for run in runs], 60.0)
+    trials, most = _counts(run.trials for run in runs), _durations(run.duration_s for run in runs)
     if all(run.least_trials == run.trials for run in runs):
-        yield f"The {trials} trials took {minutes} min as planned."
+        yield f"The {trials} trials took {most} as planned."
     else:
-        least = _counts([run.least_duration_s for run in runs], 60.0)
-        fewest = _counts([run.least_trials for run in runs])
-        yield f"A run took {fewest} trials and {least} min at the least, {trials} trials and {minutes} min at the most."
+        least = _durations(run.least_duration_s for run in runs)
+        fewest = _counts(run.least_trials for run in runs)
+        yield f"A run took {fewest} trials and {least} at the least, {trials} trials and {most} at the most."
+
+
+def _durations(seconds: Iterable[float]) -> str:
+    """Durations as a paper says them: of less than two minutes in seconds, of less than ten to a tenth of a minute.
+
+    >>> _durations([17.6]), _durations([147.0]), _durations([1420.0, 1795.0])
+    ('18 s', '2.5 min', '24 or 30 min')
+    """
+    found = list(seconds)
+    if max(found) < 120:
+        return f"{_counts(map(round, found))} s"
+    minutes = [second / 60 for second in found]
+    return f"{_counts(round(one, 1 if one < 10 else None) for one in minutes)} min"

@@ -15,6 +15,7 @@ from experiments.design.plan import CHOSEN, Condition, Plan, Trial
 from experiments.design.planning import groups, plan_of
 from experiments.design.procedures.config import least_of_track
 from experiments.design.stimuli import by_hand, settings
+from experiments.design.track_planning import own_tracks_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,11 +148,12 @@ def _check_fatigue(design: DesignConfig, found: PlannedRun) -> None:
         raise ConfigError(
             f"{found.trials_without_break} trials without a break exceed fatigue.max_trials_without_break = "
             f"{fatigue.max_trials_without_break}; make sets smaller, or breaks.between_sets_s longer than 0"
+            f"{own_tracks_words(design)}"
         )
     if found.duration_s > fatigue.max_planned_s:
         raise ConfigError(
             f"the planned duration of {found.duration_s:g} s exceeds fatigue.max_planned_s = "
-            f"{fatigue.max_planned_s:g} s; plan fewer or shorter trials and breaks"
+            f"{fatigue.max_planned_s:g} s; plan fewer or shorter trials and breaks{own_tracks_words(design)}"
         )
 
 

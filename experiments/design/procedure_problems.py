@@ -29,7 +29,6 @@ from experiments.design.procedures.config import (
 )
 from experiments.design.procedures.psychometric import Shares
 from experiments.design.procedures.surface import threshold_along
-from experiments.design.procedures.up_down import UpDown
 from experiments.design.procedures.walks import NumericLevels, are_even, level_range, walk_rule
 
 _LARGEST_GRID = 6_000_000
@@ -38,6 +37,8 @@ _LEAST_AMONG = 0.001
 """Of a prior so much at least lies among the levels."""
 _MUCH, _ROUNDED = 100, 1e-9
 """Widths so many times smaller than the distance of levels, or larger than their range, no answer tells apart."""
+_EITHER_WAY = 1
+"""So many answers at least that are not right, and so many beyond chance that are, a track meets at what it goes to."""
 _FEWEST_ITEMS, _MOST_ITEMS = 3, 30
 """Two items are one pair; the next pair of more items takes longer than a hand-over, by the fourth power (measured)."""
 
@@ -240,17 +241,32 @@ def _walk_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels, gu
 
 def _settling_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels, guess: float) -> Iterator[str]:
     """A rule that settles where who feels nothing is right as often, and steps that get nowhere."""
+    if isinstance(table, KestenConfig):
+        yield from _target_problems(table, guess)
+        return
     rule = walk_rule(table, levels, levels[0])
-    if rule.target <= guess and isinstance(rule, UpDown):
-        key = f"down = {rule.down}" if rule.ratio == 1 else f"ratio = {rule.ratio:g}"
+    if rule.target <= guess:
+        key = f"down = {table.down}" if table.ratio == 1 else f"ratio = {table.ratio:g}"
         yield (
             f"procedure.{key}: the rule settles where {rule.target:.3g} are right, and who feels nothing is right in "
             f"{guess:.3g}: it would never settle; more right answers in a row (down), or a larger ratio"
         )
-    elif rule.target <= guess:
-        yield f"procedure.target = {rule.target:g} is not above {guess:.3g}, which who feels nothing reaches"
-    if isinstance(table, UpDownConfig):
-        yield from _step_problems(table, levels)
+    yield from _step_problems(table, levels)
+
+
+def _target_problems(table: KestenConfig, guess: float) -> Iterator[str]:
+    """Steps shrink where answers turn: a track that meets answers of one kind alone ends where it happens to be."""
+    low, high = guess + _EITHER_WAY / table.trials, 1 - _EITHER_WAY / table.trials
+    if low >= high:
+        yield (
+            f"procedure.trials = {table.trials} are too few for any target, where who feels nothing is right in "
+            f"{guess:.3g}; allow more"
+        )
+    elif not low <= table.target <= high:
+        yield (
+            f"procedure.target = {table.target:g}: a track of {table.trials} trials would hardly ever turn there; "
+            f"from {low:.3g} to {high:.3g} it does (who feels nothing is right in {guess:.3g}), or allow more trials"
+        )
 
 
 def _size_problems(table: UpDownConfig | KestenConfig, levels: NumericLevels) -> Iterator[str]:
@@ -320,6 +336,11 @@ def _posterior_problems(table: PosteriorConfig, levels: Sequence[NumericLevels],
 def _threshold_problems(table: PosteriorConfig, levels: Sequence[NumericLevels]) -> Iterator[str]:
     """A prior is held against the levels: of two factors at two levels of the second at least."""
     first, name, prior = levels[0], table.of[0], table.threshold
+    below = {key: one.minimum for key, one in (("threshold", prior), ("floor", table.floor)) if one and one.minimum < 0}
+    for key, minimum in below.items():
+        yield f"procedure.{key}.minimum = {minimum:g}: no {name} is below 0; begin at 0 or above"
+    if below:
+        return
     thresholds, weights = _thresholds(table, levels)
     low, high = (x - 1e-9 * sign for sign, x in ((1, first[0]), (-1, first[-1])))
     if table.scale == "log":

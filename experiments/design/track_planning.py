@@ -17,6 +17,18 @@ from experiments.design.procedures.config import AdaptiveConfig, starts_of
 from experiments.design.streams import Stream
 
 
+def own_tracks_words(design: DesignConfig) -> str:
+    """Why tracks are many: what a message of too many trials goes on with; nothing where there is one cell."""
+    table = design.adaptive
+    several = [name for name in _with_own(design, table) if len(design.factors[name].all_levels) > 1] if table else []
+    if not several:
+        return ""
+    return (
+        f"; each level of {' and '.join(several)} has tracks of its own: name it in procedure.of or procedure.mixed, "
+        "or give it fewer levels"
+    )
+
+
 def track_parts(
     design: DesignConfig, table: AdaptiveConfig, given: Condition, set_levels: Sequence[Condition], streams: Streams
 ) -> list[list[Content]]:
@@ -24,7 +36,7 @@ def track_parts(
 
     `ConfigError`: trials that cannot be shared equally among the sets.
     """
-    fixed = [name for name in design.varying if name not in (*table.of, *table.mixed)]
+    fixed = _with_own(design, table)
     parts: dict[int, list[Content]] = {}
     tracks = 0
     for combo in dict.fromkeys(set_levels):
@@ -38,10 +50,16 @@ def track_parts(
         if tracks * table.trials > MAX_TRIALS:
             raise ConfigError(
                 f"procedure.trials = {table.trials}: tracks make more than {MAX_TRIALS:,} trials together"
+                f"{own_tracks_words(design)}"
             )
         ordered = _ordered(table, made, streams.of("tracks", *(str(level) for _, level in combo)))
         parts |= dict(zip(places, _shared(ordered, len(places)), strict=True))
     return _with_catch(design, [parts[at] for at in sorted(parts)], given, streams)
+
+
+def _with_own(design: DesignConfig, table: AdaptiveConfig) -> list[str]:
+    """The factors that vary and whose levels have tracks of their own: neither chosen nor mixed."""
+    return [name for name in design.varying if name not in (*table.of, *table.mixed)]
 
 
 def _track(
