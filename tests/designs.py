@@ -12,9 +12,13 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.synthetic.laws import SyntheticAnswers
+from recoil.config_files import designs
 
 Tables = Mapping[str, Any]
 
+SHIPPED = tuple(designs())
+"""The names of the shipped designs."""
+OF_THE_PAPER, ADAPTIVE = ("direction", "preference"), ("staircase", "threshold")
 QUESTION = {"kind": "choice", "text": "Which way?", "answers": ["forward", "backward"]}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,12 @@ from experiments.session.steps import (
     Close,
     Closed,
     Describe,
+    Failed,
     Fired,
     FireShot,
     Inform,
     Informed,
+    Interrupted,
     Outcome,
     Prepare,
     Prepared,
@@ -38,11 +40,12 @@ FIRED = Fired(
     onset_utc="2026-01-01T00:00:00.000000Z",
     requested_s=0.0,
     pulse_start_s=0.0,
-    pulse_end_s=0.0,
-    home_predicted_s=0.0,
+    pulse_end_s=0.01,
+    home_predicted_s=0.2,
     motion="home",
 )
 SHOWN = Presented(gun="simulated", onset_utc=FIRED.onset_utc, shots=2, exposure_s=2.0, ended_by="next")
+FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
 
 
 def session_of(design: DesignConfig, gun: GunConfig, plan: Plan) -> Session:
@@ -69,6 +72,17 @@ def done(step: Step, number: int) -> Outcome:
         case _:
             own = isinstance(step, Ask)
             return Answered(value=answer(step, number), by="synthetic", response_time_s=0.5, response_time_valid=own)
+
+
+def steps_of(session: Session, troubles: Mapping[int, Outcome] | None = None) -> list[Step]:
+    """All steps of a session; the n-th is sent `troubles[n]` instead of what becomes of it where nothing goes wrong."""
+    steps: list[Step] = []
+    step: Step | None = next(session)
+    while step is not None:
+        outcome = (troubles or {}).get(len(steps)) or done(step, len(steps))
+        steps.append(step)
+        step = step_after(session, outcome)
+    return steps
 
 
 def answer(step: Ask | Rate | Describe, number: int) -> str | float:

@@ -1,9 +1,10 @@
-"""Guns at the ends of what is allowed."""
+"""Guns at random, and at the ends of what is allowed."""
 
 import dataclasses
 import math
 
 import numpy as np
+from hypothesis import strategies as st
 
 from device.parameters import DriveOff, Emf
 from device.physics import GunParameters, simulate
@@ -135,3 +136,20 @@ def shoot(simulate=simulate, **changes):
     summary = simulate(GunParameters(**changes))
     assert all(math.isfinite(value) for value in numbers(summary).values())
     return summary
+
+
+def guns_about(**more):
+    """Guns at random about the paper's, their numbers drawn, and `more` of them."""
+    return st.builds(
+        GunParameters,
+        magnet_mass_kg=st.floats(0.02, 0.5),
+        inductance_H=st.floats(2e-4, 5e-3),
+        stiffness_N_m=st.floats(0.0, 100.0),
+        preload_length_m=st.floats(0.0, 0.2),
+        friction_N=st.floats(0.0, 2.0),
+        voltage_V=st.floats(0.0, 24.0),
+        pulse_s=st.floats(0.0, 0.03),
+        drive_off=st.sampled_from(["shorted", "open"]),
+        emf=st.sampled_from(["printed", "reciprocal"]),
+        **more,
+    )

@@ -930,8 +930,8 @@ journal proves is used with a remark: its clock was wrong, not its answers.
   half of the trials, and all together are so by guessing less than once in a thousand. People who are sometimes right
   and sometimes wrong look the same either way, as do answers that were copied from the column of directions.
 - Copies of fewer than ten rows, of a part of a log without times, of people who are nearly always right and have no
-  times, of logs that ask for no choice (ratings, numbers, rankings, words), and copies in which every time was changed by
-  some ms.
+  times, of logs that ask for no choice (ratings, numbers, rankings, words), and copies in which every time was changed
+  by some ms.
 - Whether the unit of response times is right where both readings are human: 1 to 60 are taken as they are.
 - Tables without any journal: that is said, and they are read.
 """

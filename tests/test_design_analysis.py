@@ -20,11 +20,11 @@ from experiments.load import load_setup, shipped_folder
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from tests.bids_validator import validated
-from tests.designs import path_of
+from tests.designs import ADAPTIVE, OF_THE_PAPER, SHIPPED, path_of
 
 pytestmark = pytest.mark.slow
 
-NAMES = ("detection", "grip", "hurry", "magnitude", "pairs", "realism", "stronger", "voltages")
+NAMES = [name for name in SHIPPED if name not in (*OF_THE_PAPER, *ADAPTIVE)]
 PEOPLE = 4
 
 

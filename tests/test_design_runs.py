@@ -21,10 +21,9 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import FireShot, Inform, Prepare, Rest
 from experiments.study.folders import place
 from recoil.config_files import copy_began_with
-from tests.designs import changed, path_of
+from tests.designs import SHIPPED, changed
 
-TEN = ("direction", "preference", "voltages", "detection", "stronger", "magnitude", "realism", "pairs", "grip", "hurry")
-SETUPS = {name: load_setup(str(path_of(name))) for name in TEN}
+SETUPS = {name: load_setup(name) for name in SHIPPED}
 SETUPS["preference"] = changed("preference", laws={"questions": {"comment": {"texts": ("soft",)}}})
 """Whose people say something, so every question has an answer."""
 SETUPS["threshold"] = changed("threshold", procedure={"trials": 6})

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Plan
 from experiments.design.planned import planned_run
 from experiments.design.planning import plan_of
 from experiments.load import load_setup
@@ -22,54 +22,21 @@ from experiments.session.steps import (
     Answered,
     Ask,
     Close,
-    Closed,
-    Failed,
-    Fired,
     FireShot,
-    Interrupted,
     Outcome,
     Prepare,
-    Prepared,
     Repeated,
     Rest,
-    Rested,
     Step,
     step_record,
 )
 from tests.designs import changed
+from tests.driven_designs import FAILED, FELT, FIRED, UNFELT, steps_of
 
 SETUP = load_setup("direction")
 PLAN = plan_of(SETUP.config, "P01", 1)
 DAMPERS = {"vibration": "", "asymmetric-1": "off", "asymmetric-2": "on"}
-FIRED = Fired(
-    gun="simulated",
-    onset_utc="2024-01-01T00:00:00.000000Z",
-    requested_s=0.0,
-    pulse_start_s=0.0,
-    pulse_end_s=0.01,
-    home_predicted_s=0.2,
-    motion="home",
-)
-FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
-
-
-def answered(trial: Trial) -> Answered:
-    return Answered(value=trial.direction, by="synthetic", response_time_s=1.0, response_time_valid=True)
-
-
-def fitting(step: Step) -> Outcome:
-    """What the world says when all goes well."""
-    match step:
-        case Prepare():
-            return Prepared()
-        case FireShot():
-            return FIRED
-        case Ask():
-            return answered(step.trial)
-        case Close():
-            return Closed()
-        case _:
-            return Rested(rested_s=step.duration_s)
+ANSWERED = Answered(value="forward", by="synthetic", response_time_s=1.0, response_time_valid=True)
 
 
 def driven(plan: Plan, setup: Setup[DesignConfig], troubles: dict[int, Outcome] | None = None) -> list[Step]:
@@ -80,17 +47,7 @@ def driven(plan: Plan, setup: Setup[DesignConfig], troubles: dict[int, Outcome] 
 
 
 def to_the_end(plan: Plan, setup: Setup[DesignConfig], troubles: dict[int, Outcome] | None = None) -> list[Step]:
-    """All steps of a session; the n-th is sent `troubles[n]` instead of what fits."""
-    going, steps = design_session(plan, setup), []
-    step = next(going)
-    while step is not None:
-        steps.append(step)
-        outcome = (troubles or {}).get(len(steps) - 1, fitting(step))
-        try:
-            step = going.send(outcome)
-        except StopIteration:
-            step = None
-    return steps
+    return steps_of(design_session(plan, setup), troubles)
 
 
 def with_breaks(between_sets_s: float, between_sessions_s: float) -> Setup[DesignConfig]:
@@ -301,8 +258,8 @@ def test_what_is_no_step_is_refused(body: object) -> None:
         None,
         {},
         {"kind": "answered"},
-        step_record(answered(PLAN.trials[0])) | {"value": ["left"]},
-        step_record(answered(PLAN.trials[0])) | {"by": "nobody"},
+        step_record(ANSWERED) | {"value": ["left"]},
+        step_record(ANSWERED) | {"by": "nobody"},
         {"kind": "answered", "value": {}, "by": "participant"},
         step_record(STEPS[0]),
     ],

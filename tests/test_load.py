@@ -11,22 +11,9 @@ from experiments.config.door import ConfigError, read_toml
 from experiments.config.findings import line_of
 from experiments.load import check_limits, find, load_gun, load_setup, load_study, shipped_folder
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw
+from tests.designs import OF_THE_PAPER, SHIPPED
 from tests.refusals import Broken, check_refused, edit, line, refusal
 
-OF_THE_PAPER = ("direction", "preference")
-DESIGNS = (
-    "voltages",
-    "detection",
-    "stronger",
-    "magnitude",
-    "realism",
-    "pairs",
-    "grip",
-    "hurry",
-    "threshold",
-    "staircase",
-    *OF_THE_PAPER,
-)
 DIRECTION, PREFERENCE, GUN = "direction.toml", "preference.toml", "gun.toml"
 ANSWERING, RATING = "synthetic/direction.toml", "synthetic/preference.toml"
 """Who answers the two."""
@@ -62,7 +49,7 @@ def test_a_shipped_config_loads_by_its_name_and_is_within_the_limits(name: str, 
 
 
 def test_every_shipped_config_loads() -> None:
-    known = {*DESIGNS, "gun", "gun-five", "study", "paper"}
+    known = {*SHIPPED, "gun", "gun-five", "study", "paper"}
     assert {path.stem for path in shipped_folder().glob("*.toml")} == known
     assert list(load_gun(shipped_folder() / GUN).methods) == ["vibration", "asymmetric-1", "asymmetric-2"]
     study, folder = load_study("study")

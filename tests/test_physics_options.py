@@ -5,27 +5,14 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from device.parameters import damper_friction
 from device.physics import GunParameters, hand, simulate
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
 from device.physics.traces import energy_balance
+from tests.extreme_guns import guns_about
 
 VARIANTS = [(f, off, emf) for f in (0.21, 1.12) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
-
-guns = st.builds(
-    GunParameters,
-    magnet_mass_kg=st.floats(0.02, 0.5),
-    inductance_H=st.floats(2e-4, 5e-3),
-    stiffness_N_m=st.floats(0.0, 100.0),
-    preload_length_m=st.floats(0.0, 0.2),
-    friction_N=st.floats(0.0, 2.0),
-    voltage_V=st.floats(0.0, 24.0),
-    pulse_s=st.floats(0.0, 0.03),
-    drive_off=st.sampled_from(["shorted", "open"]),
-    emf=st.sampled_from(["printed", "reciprocal"]),
-)
 
 
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
@@ -43,7 +30,7 @@ def test_the_printed_back_emf_swallows_energy_in_the_recoil_and_makes_it_in_a_sh
     assert energy_balance(GunParameters(drive_off="shorted")).created_J > 0.5
 
 
-@given(gun=guns)
+@given(gun=guns_about())
 @settings(max_examples=30, deadline=None, derandomize=True)
 def test_the_audit_of_any_gun_closes(gun):
     found = energy_balance(gun)

@@ -10,63 +10,30 @@ from experiments.session.design_session import design_session
 from experiments.session.steps import (
     Answered,
     Close,
-    Closed,
     Describe,
-    Failed,
-    Interrupted,
     Outcome,
     Prepare,
-    Prepared,
     Present,
-    Presented,
     Rate,
     Repeated,
     Step,
     step_record,
 )
+from tests.driven_designs import FAILED, FELT, UNFELT, steps_of
 
 SETUP = load_setup("preference")
 PLAN = plan_of(SETUP.config, "P01", 1)
-FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
 QUESTION = (
     "How much do you like such haptic feedback for simulating shooting recoil in a first-person shooting game "
     "in virtual reality?"
 )
 
 
-def fitting(step: Step) -> Outcome:
-    match step:
-        case Prepare():
-            return Prepared()
-        case Present():
-            return Presented(
-                gun="simulated", onset_utc="2024-01-01T00:00:00.000000Z", shots=3, exposure_s=2.5, ended_by="next"
-            )
-        case Rate():
-            return Answered(value=0.0, by="participant")
-        case Close():
-            return Closed()
-        case _:
-            return Answered(value="", by="experimenter")
-
-
 def driven(troubles: dict[int, Outcome] | None = None) -> list[Step]:
     """All steps but the close at the end."""
-    steps = to_the_end(troubles)
+    steps = steps_of(design_session(PLAN, SETUP), troubles)
     assert steps[-1] == Close()
     return steps[:-1]
-
-
-def to_the_end(troubles: dict[int, Outcome] | None = None) -> list[Step]:
-    going, steps = design_session(PLAN, SETUP), []
-    step: Step | None = next(going)
-    while step is not None:
-        steps.append(step)
-        try:
-            step = going.send((troubles or {}).get(len(steps) - 1, fitting(step)))
-        except StopIteration:
-            step = None
-    return steps
 
 
 STEPS = driven()

@@ -24,26 +24,12 @@ from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import RUN, answers, words
 from tests.at_terminal import AtTerminal
 from tests.conftest import Soak
-from tests.designs import design
+from tests.designs import OF_THE_PAPER, SHIPPED, design
 from tests.warm_start import warm
 
 pytest.importorskip("PyQt6")
 pytestmark = [pytest.mark.soak, needs_display]
 
-SHIPPED = (
-    "direction",
-    "preference",
-    "voltages",
-    "detection",
-    "stronger",
-    "magnitude",
-    "realism",
-    "pairs",
-    "grip",
-    "hurry",
-    "threshold",
-    "staircase",
-)
 DESIGNS = (*SHIPPED, "ranked")
 """The shipped ones, and pairs that are chosen by the answers."""
 
@@ -169,7 +155,7 @@ def test_what_they_leave_is_analysed_drawn_and_exported(place: Path, soak: Soak)
     report = (place / "analysis" / "report.md").read_text(encoding="utf-8")
     figures = {path.stem for path in (place / "analysis" / "figures").glob("*.png")}
     drawn = [name for name in DESIGNS if any(f"{one}-".startswith(f"figure-{name}-") for one in figures)]
-    assert set(drawn) == set(DESIGNS) - {"direction", "preference"}  # their own figures stand under other names
+    assert set(drawn) == set(DESIGNS).difference(OF_THE_PAPER)  # their own figures stand under other names
     titles = {load_setup(str(place / "configs" / f"{name}.toml")).config.title for name in drawn}
     assert all(title.rstrip("?") in report for title in titles)
     exported = {path.name.split("_task-")[1].split("_")[0] for path in (place / "results" / "bids").rglob("*_beh.tsv")}

@@ -14,10 +14,7 @@ from experiments.record.tables import Row, guard, table_bytes, unguard
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import (
     Answered,
-    Failed,
-    Fired,
     FireShot,
-    Interrupted,
     Outcome,
     Prepare,
     Prepared,
@@ -28,6 +25,7 @@ from experiments.session.steps import (
     Step,
 )
 from tests.asked import ask, describe, rate
+from tests.driven_designs import FAILED, FELT, FIRED, UNFELT
 
 FORMULA_STARTS = tuple("=+-@\t\r")
 DESIGNS = {name: load_setup(name).config for name in ("direction", "preference")}
@@ -122,16 +120,6 @@ def test_the_columns_of_the_contract_come_in_its_order() -> None:
 
 # rows from what was done
 
-FIRED = Fired(
-    gun="COM:1",
-    onset_utc="2024-01-01T00:00:00.000000Z",
-    requested_s=0.0,
-    pulse_start_s=0.0,
-    pulse_end_s=0.01,
-    home_predicted_s=0.2,
-    motion="home",
-)
-FAILED, FELT, UNFELT = Failed(cause="no answer"), Interrupted(presented=True), Interrupted(presented=False)
 PLANNED = ("participant_id", "experiment", "session", "method", "set", "trial", "direction")
 
 
@@ -173,7 +161,7 @@ def test_an_answer_is_correct_if_it_is_the_direction(response: str) -> None:
     assert row["response"] == response
     assert row["correct"] == ("1" if response == DIRECTION.trials[3].direction else "0")
     assert (row["response_time_s"], row["response_time_valid"], row["response_source"]) == ("0.0", "0", "experimenter")
-    assert (row["attempts"], row["flags"], row["gun"]) == ("1", "", "COM:1")
+    assert (row["attempts"], row["flags"], row["gun"]) == ("1", "", "simulated")
 
 
 @pytest.mark.parametrize(

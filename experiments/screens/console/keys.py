@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from experiments.design.language import QuestionConfig
 from experiments.session import events
@@ -23,10 +23,7 @@ BOUNCE_S = 0.02
 STRANGE_S = 2.0
 """An event whose time is further off than this is not dated by the clock that the others are."""
 
-Name = Literal[
-    "fire",
-    "next",
-    "damper",
+_Answer = Literal[
     "answer 1",
     "answer 2",
     "answer 3",
@@ -36,6 +33,12 @@ Name = Literal[
     "answer 7",
     "answer 8",
     "answer 9",
+]
+Name = Literal[
+    "fire",
+    "next",
+    "damper",
+    _Answer,
     "enter",
     "no answer",
     "end break",
@@ -68,17 +71,7 @@ class KeyCommand:
     kind: type[Event] | None = None
 
 
-ANSWERS: tuple[Name, ...] = (
-    "answer 1",
-    "answer 2",
-    "answer 3",
-    "answer 4",
-    "answer 5",
-    "answer 6",
-    "answer 7",
-    "answer 8",
-    "answer 9",
-)
+ANSWERS: tuple[Name, ...] = get_args(_Answer)
 """What enters the first answer of a question, the second, ...: the question has its key, and what it says."""
 
 _C = KeyCommand
