@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -85,3 +89,37 @@ def people(count: int, each: int, random: np.random.Generator) -> list[list[Hand
         return HandMechanics(stiffness_N_m=of.stiffness_N_m * firm, damping_N_s_m=of.damping_N_s_m * soft)
 
     return [[hand(person, 0.1) for _ in range(each)] for person in (hand(usual, 0.25) for _ in range(count))]
+
+
+_WRITER = """
+import itertools, random, sys, time
+path, course, pauses = sys.argv[1:]
+values = [float(line) for line in open(course)]
+rate, sent = len(values), time.monotonic() - 0.1
+with open(path, "w", buffering=1 << 20) as file:
+    for pause in itertools.cycle(map(float, pauses.split(","))):
+        time.sleep(pause)
+        now = time.monotonic()
+        for n in range(int(sent * rate) + 1, int(now * rate) + 1):
+            file.write(f"{n / rate - 1000:.6f},{values[n % rate] + random.gauss(0, 0.1):.3f}\\n")
+        file.flush()
+        sent = now
+"""
+
+
+@contextmanager
+def stream_written(path: Path, pauses: str) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
+    """A process that writes a sensor's lines into a file, after these pauses in turn: what was measured since the last.
+
+    A shot of the damped gun begins at every full second of this machine's clock, from which its own is 1,000 s off.
+    """
+    values = np.interp(np.arange(round(RATE_HZ)) / RATE_HZ, FINE, course(DAMPED), right=0.0)
+    values += np.interp(np.arange(round(RATE_HZ)) / RATE_HZ - 1, FINE, course(DAMPED), left=0.0)
+    numbers = path.with_suffix(".numbers")
+    numbers.write_text("\n".join(map(str, values.tolist())), encoding="ascii")
+    path.touch()
+    with subprocess.Popen([sys.executable, "-c", _WRITER, str(path), str(numbers), pauses]) as process:
+        try:
+            yield process, path
+        finally:
+            process.kill()

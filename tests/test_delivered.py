@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
-import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,17 +18,17 @@ from hypothesis import strategies as st
 
 from device.methods import paper_methods
 from device.physics.hand import HandMechanics, held_acceleration, simulate_held
-from device.plugin.guard import PluginError
-from device.sensor.door import open_sensor
 from device.sensor.expected import expected_shot
-from device.sensor.link import SensorEnd, SensorLink
+from device.sensor.link import SensorEnd
 from device.sensor.measuring import ExpectedShot, SensorTrace, measured
-from device.sensor.process import SampleBuffer, ShotAsked, ShotReply
-from device.sensor.streams import CsvSensor, SensorClock, SensorError, checked_samples
+from device.sensor.process import ShotReply
+from device.sensor.streams import SensorError
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import Setup
+from experiments.delivered import recorder
 from experiments.delivered.marks import FRICTION_SPREAD, PEAK_SPREAD, SUM_LIMIT, Z_LIMIT, DeliveryLevel, after_shot
 from experiments.design.config import DesignConfig
+from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
 from experiments.record.journal import Contents, read_journal
 from experiments.run import Finished, RunRequest, run
@@ -38,8 +36,6 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.watch.runs import RunSoFar
 from tests.at_controls import short_direction
 from tests.delivered_chain import DAMPED, RATE_HZ, course, marks_of, measured_shot, parts_of, slipped
-from tests.gun_plugins import ACCELEROMETER, install_sensor
-from tests.waiting import wait_for
 
 MASS_KG = 0.2262
 
@@ -157,133 +153,6 @@ def test_a_run_has_its_own_level():
     assert level.mean == pytest.approx(1.12, abs=0.002)
 
 
-# what samples may be
-
-
-@pytest.mark.parametrize(
-    ("said", "rule"),
-    [
-        (3, "it must be a sequence"),
-        ([(0.0,)], "two finite numbers"),
-        ([(0.0, math.nan)], "two finite numbers"),
-        ([("0", 1.0)], "two finite numbers"),
-        ([(2.0, 1.0), (1.0, 1.0)], "its time went back from 2.000000 s to 1.000000 s"),
-    ],
-)
-def test_samples_that_cannot_be_are_refused(said: object, rule: str):
-    with pytest.raises(SensorError, match=rule):
-        checked_samples("read", said, 0.0)
-
-
-def test_a_sensor_s_clock_is_put_on_the_host_s_by_what_came_soonest():
-    now = 0.0
-    clock = SensorClock(lambda: now)
-    late = np.random.default_rng(7).exponential(0.004, 4000)
-    errors = []
-    for i, delay in enumerate(late.tolist()):
-        true_s = i / 1000
-        now = true_s + delay
-        (host_s,) = clock.host_times([500.0 + true_s * 1.00005])  # 50 ppm fast
-        errors.append(host_s - true_s)
-    assert max(map(abs, errors[2000:])) < 0.001
-
-
-def test_lines_of_a_csv_are_samples_and_others_are_named(tmp_path: Path):
-    path = tmp_path / "stream.csv"
-    path.write_text("0.0,9.9\n")
-    sensor = CsvSensor(str(path), lambda: 100.0)
-    with path.open("a") as file:
-        file.write("time_s,acceleration\n1.0,2.5\n1.001,")
-        file.flush()
-        assert sensor.read() == [(100.0, 2.5)]
-        file.write("-2.5\n1.002;3\n")
-    with pytest.raises(SensorError, match=r"'1.002;3' is no line `time_s,acceleration_m_s2`"):
-        sensor.read()
-    sensor.close()
-    with pytest.raises(SensorError, match="cannot be opened"):
-        CsvSensor(str(tmp_path / "none"), time.monotonic)
-
-
-def test_a_trace_with_a_gap_or_without_an_end_is_not_measured():
-    buffer, times = SampleBuffer(), np.arange(0.0, 2.0, 1 / RATE_HZ)
-    buffer.take([(t, 0.0) for t in times.tolist() if not 0.99 < t < 1.01])
-    asked = ShotAsked(number=1, pulse_start_s=1.0, actuator=DAMPED)
-    reply = buffer.reply_to(asked, 2.0)
-    assert reply is not None
-    assert "gap of 0.02" in reply.because
-    late = replace(asked, pulse_start_s=1.99)
-    assert buffer.reply_to(late, 2.0) is None
-    reply = buffer.reply_to(late, 4.0)
-    assert reply is not None
-    assert reply.because == "the sensor gave no samples of it"
-
-
-# plug-ins
-
-SENSOR = """
-class Sensor:
-    def read(self): ...
-    def close(self): ...
-    {more}
-def open_sensor(rest, clock):
-    return {made}
-"""
-
-
-@pytest.mark.parametrize(
-    ("source", "said"),
-    [
-        (
-            SENSOR.format(more="read = None", made="Sensor()"),
-            "sensor plug-in bad: Sensor has no read; a sensor has read",
-        ),
-        (SENSOR.format(more="def read(self, n): ...", made="Sensor()"), r"it cannot be called as read\(\)"),
-        (SENSOR.format(more="", made="1 / 0"), "sensor plug-in bad did not open 'x': ZeroDivisionError"),
-        ("", "sensor plug-in bad did not open 'x': AttributeError"),
-    ],
-)
-def test_a_plug_in_that_lacks_something_is_refused_by_name(tmp_path, monkeypatch, source: str, said: str):
-    install_sensor(monkeypatch, tmp_path, source, name="bad", module="bad_sensor")
-    with pytest.raises((SensorError, PluginError), match=said):
-        open_sensor("bad:x", time.monotonic)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("source", "said"),
-    [
-        ("import time\ntime.sleep(3600)\n", "sleeper:x: was not ready within 1 s; did its import or its device hang"),
-        ("import os\nos._exit(3)\n", "sleeper:x: its process ended with exit code 3"),
-    ],
-)
-def test_a_plug_in_that_hangs_or_dies_at_import_is_refused_by_name(tmp_path, monkeypatch, source: str, said: str):
-    install_sensor(monkeypatch, tmp_path, source, name="sleeper", module="sleeper_sensor")
-    with pytest.raises(SensorError, match=said):
-        SensorLink("sleeper:x", start_s=1.0 if "sleep" in source else 30.0)
-
-
-def test_no_such_sensor_is_told_with_those_there_are():
-    with pytest.raises(
-        ValueError, match=r"must be .simulated. or .csv:PATH., or begin with the name of a sensor plug-in"
-    ):
-        open_sensor("nosuch:1", time.monotonic)
-
-
-def test_the_accelerometer_of_the_docs_reads_a_serial_line(tmp_path, monkeypatch):
-    install_sensor(monkeypatch, tmp_path, ACCELEROMETER.read_text(), name="serial-accelerometer", module="serial_acc")
-    ours, theirs = os.openpty()
-    now = 50.0
-    sensor = open_sensor(f"serial-accelerometer:{os.ttyname(theirs)}", lambda: now)
-    os.write(ours, b"999,1\n4294967000,1000\n704,-500\nrub")
-    found = list[tuple[float, float]]()
-    wait_for(lambda: found.extend(sensor.read()) or len(found) == 3)
-    sensor.close()
-    os.close(ours)
-    os.close(theirs)
-    assert [value for _, value in found] == pytest.approx([0.00980665, 9.80665, -4.903325])
-    assert found[2][0] - found[1][0] == pytest.approx(0.001)  # over the end of its counter
-
-
 # beside a run
 
 
@@ -366,83 +235,78 @@ def test_a_run_without_a_sensor_has_no_table_of_shots(tmp_path: Path):
             "goes with --gun simulated; it would measure nothing of serial:",
         ),
         ("csv:x", "simulated", VirtualClock(), "measures in real time, and this run's clock is virtual"),
-        ("simulated:slip=2", "simulated", VirtualClock(), "give slip, after, noise as a number"),
+        ("simulated:slip=2", "simulated", VirtualClock(), "slip is 2; it must be from 0 to 1"),
+        ("simulated:after=-3", "simulated", VirtualClock(), "after is -3; it must be a number of shots, from 0"),
+        ("simulated:slip=nan", "simulated", VirtualClock(), "slip is nan; it must be from 0 to 1"),
+        ("simulated:slip=x", "simulated", VirtualClock(), "'x' is no number"),
+        ("simulated:slips=1", "simulated", VirtualClock(), "there is no 'slips'; give slip, after, noise"),
+        ("simulated:slip=0.1,slip=0.2", "simulated", VirtualClock(), "slip is given twice"),
     ],
 )
 def test_a_sensor_that_can_measure_nothing_is_refused(sensor: str, gun: str, clock: Any, said: str):
-    from experiments.delivered.recorder import open_recorder
-
     with (
         pytest.raises(SensorError, match=said),
-        open_recorder(sensor, gun, {}, clock, again=False, random=np.random.default_rng(1)),
+        recorder.open_recorder(sensor, gun, {}, clock, again=False, random=np.random.default_rng(1)),
     ):
         pass
 
 
-class EndsAfter:
-    """A sensor's end that answers so many shots, then is over."""
+class Falters:
+    """A sensor's end that sees no peak (`p`), is silent (`s`), and is over after the last of these letters."""
 
-    address, immediate = "short:1", True
+    address, silent, ended = "short:1", False, ""
 
-    def __init__(self, shots: int) -> None:
-        self._left = shots
+    def __init__(self, answers: str) -> None:
+        self._answers = iter(answers)
 
     def ask(self, _: float, actuator: Any) -> ShotReply:
-        self._left -= 1
-        if self._left < 0:
+        answer = next(self._answers, "")
+        self.silent = answer == "s"
+        if not answer:
             raise SensorError("short:1: it broke off: EOFError")
+        if self.silent:
+            return ShotReply(number=1, because="the sensor gave no samples of it")
         return ShotReply(number=1, expected=expected_shot(actuator, RATE_HZ))
 
     def close(self) -> None: ...
 
 
-def test_a_run_goes_on_when_its_sensor_ends_which_is_said_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from experiments.delivered import recorder
+def run_faltering(
+    patch: pytest.MonkeyPatch, results: Path, setup: Setup[DesignConfig], answers: str
+) -> tuple[Contents, list[str]]:
+    """A run with such a sensor, and what the experimenter was told of it."""
+    make: Callable[..., SensorEnd] = lambda *_: Falters(answers)  # noqa: E731
+    patch.setattr(recorder, "SimulatedSensor", make)
+    told = list[str]()
 
-    make: Callable[..., SensorEnd] = lambda *_: EndsAfter(5)  # noqa: E731
-    monkeypatch.setattr(recorder, "SimulatedSensor", make)
-    done = run_with(tmp_path, "simulated")
-    contents = read_journal(done.place.journal)
-    shots = rows_of(shots_table(contents))
+    def screen(*given: Any) -> Any:
+        made = synthetic_screen(*given)
+        made.trouble = told.append
+        return made
+
+    request = RunRequest(setup=setup, participant_id="P01", results=results, sensor="simulated", seed=3)
+    return read_journal(run(request, screen, VirtualClock()).place.journal), told
+
+
+def test_a_run_goes_on_when_its_sensor_is_silent_or_ends_which_is_said_once(tmp_path, monkeypatch):
+    contents, told = run_faltering(monkeypatch, tmp_path, short_design(), "pssssp")
+    marks = [(row["mark"], row["because"]) for row in rows_of(shots_table(contents))]
     assert contents.finished
-    assert Counter(row["mark"] for row in shots) == {"no-peak": 5, "not-measured": len(shots) - 5}
-    notes = [record.body for record in contents.records if record.kind == "remark"]
-    assert sum("The sensor ended (short:1: it broke off: EOFError)" in str(note) for note in notes) == 1
+    assert [mark for mark, _ in marks[:7]] == ["no-peak", *["not-measured"] * 4, "no-peak", "not-measured"]
+    assert {because for _, because in marks[6:]} == {"the sensor had ended"}
+    notes = [record.body["text"] for record in contents.records if "noted" in str(record.body)]
+    assert [note[:26] for note in notes] == [
+        "The sensor is silent: no s",
+        "The sensor is heard again.",
+        "The sensor ended (short:1:",
+    ]
+    assert set(notes) <= set(told)
+    assert len(told) == len(notes) + 2  # a line for each shot without a peak
 
 
-STOPS = """
-import os
-class Sensor:
-    def __init__(self, rest, clock):
-        self.plug, self.clock = rest, clock
-        self.last_s = clock()
-    def read(self):
-        now_s, found = self.clock(), []
-        if not os.path.exists(self.plug):
-            raise EOFError("the plug was pulled")
-        while self.last_s < now_s:
-            found.append((self.last_s, 0.01 * len(found)))
-            self.last_s += 1 / 2000
-        return found
-    def close(self): ...
-def open_sensor(rest, clock):
-    print("what a plug-in prints harms nobody")
-    return Sensor(rest, clock)
-"""
-
-
-@pytest.mark.slow
-def test_a_real_process_measures_and_says_why_it_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    install_sensor(monkeypatch, tmp_path, STOPS, name="stops", module="stops_sensor")
-    plug = tmp_path / "plug"
-    plug.touch()
-    link = SensorLink(f"stops:{plug}")
-    try:
-        assert 1900 < link.ready.rate_Hz < 2100
-        reply = link.ask(time.monotonic() - 0.3, DAMPED)
-        assert (reply.because, reply.seen) == ("", None)
-        plug.unlink()
-        with pytest.raises(SensorError, match="it broke off: EOFError: the plug was pulled"):
-            link.ask(time.monotonic(), DAMPED)
-    finally:
-        link.close()
+def test_shots_of_a_train_that_were_not_delivered_are_told_in_one_line(tmp_path, monkeypatch):
+    contents, told = run_faltering(monkeypatch, tmp_path, load_setup("preference"), "p" * 1000)
+    shots = Counter(row["trial"] for row in rows_of(shots_table(contents)))
+    assert [one.partition(" not delivered")[0] for one in told] == [
+        f"Trial {trial}: {count} of {count} shots were" for trial, count in shots.items()
+    ]

@@ -9,13 +9,19 @@ import threading
 import time
 from collections import deque
 
+import numpy as np
+
 from device.sensor.door import open_sensor
-from device.sensor.link import SensorReady, SensorSaid, asked_of, said_line
-from device.sensor.process import LEAST_RATE_HZ, SAMPLES_S, SampleBuffer, ShotAsked
+from device.sensor.link import SensorSaid, asked_of, said_line
+from device.sensor.process import LEAST_RATE_HZ, SAMPLES_S, SampleBuffer, SensorReady, ShotAsked
 from device.sensor.streams import Sensor, SensorError, checked_samples
 from device.words import DeviceError
 
-READ_EVERY_S = 0.01
+READ_EVERY_S = 0.005, 0.015
+"""It is read at uneven times: a sensor whose batches come evenly would else always be heard equally late."""
+_RANDOM = np.random.default_rng()
+UNHEARD_S = 1.0
+"""A sensor that gave no sample for so long is silent."""
 FIRST_SAMPLES_S = 5.0
 """So long a sensor that was opened may take until it has given a second of samples."""
 
@@ -30,6 +36,7 @@ def serve_sensor(address: str, out: int) -> None:
         os.write(out, said_line(SensorSaid(ready=ready)))
         asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
         threading.Thread(target=_listen, args=(asked,), daemon=True).start()
+        threading.Thread(target=_watch, args=(buffer, out), daemon=True).start()
         waiting = deque[ShotAsked]()
         while True:
             _read(sensor, buffer)
@@ -38,7 +45,7 @@ def serve_sensor(address: str, out: int) -> None:
             while waiting and (reply := buffer.reply_to(waiting[0], time.monotonic())):
                 waiting.popleft()
                 os.write(out, said_line(SensorSaid(reply=reply)))
-            time.sleep(READ_EVERY_S)
+            time.sleep(_RANDOM.uniform(*READ_EVERY_S))
     finally:
         sensor.close()
 
@@ -50,7 +57,7 @@ def _read(sensor: Sensor, buffer: SampleBuffer) -> None:
         raise
     except Exception as error:
         raise SensorError(f"it broke off: {type(error).__name__}: {error}") from error
-    buffer.take(checked_samples("read", said, buffer.last_s))
+    buffer.take(checked_samples("read", said, buffer.last_s), time.monotonic())
 
 
 def _become_ready(sensor: Sensor, buffer: SampleBuffer) -> None:
@@ -59,9 +66,18 @@ def _become_ready(sensor: Sensor, buffer: SampleBuffer) -> None:
         _read(sensor, buffer)
         if time.monotonic() > end_s:
             raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s; is it on?")
-        time.sleep(READ_EVERY_S)
+        time.sleep(_RANDOM.uniform(*READ_EVERY_S))
     if buffer.rate_Hz < LEAST_RATE_HZ:
         raise SensorError(f"it gives {buffer.rate_Hz:.0f} samples a second; at least {LEAST_RATE_HZ:g} are needed")
+
+
+def _watch(buffer: SampleBuffer, out: int) -> None:
+    """Say when samples come no more, and again: beside the reading, which may hang."""
+    silent = False
+    while True:
+        time.sleep(UNHEARD_S / 5)
+        if silent != (silent := time.monotonic() > buffer.heard_s + UNHEARD_S):
+            os.write(out, said_line(SensorSaid(silent=silent)))
 
 
 def _listen(asked: queue.SimpleQueue[ShotAsked]) -> None:

@@ -24,7 +24,7 @@ def open_sensor(address: str, clock: Callable[[], float]) -> Sensor:
     """The sensor at `csv:PATH`, or `NAME:REST` of a plug-in. `DeviceError` and `ValueError` say why there is none."""
     name, _, rest = address.partition(":")
     if name == "csv":
-        return CsvSensor(rest, clock)
+        return CsvSensor(rest)
     point = entry_of(name, SENSOR_PLUGINS)
     who = f"{SENSOR_PLUGINS.name} {name}"
     try:

@@ -20,7 +20,7 @@ from typing import Protocol
 from pydantic import TypeAdapter, ValidationError
 
 from device.methods import Method
-from device.sensor.process import SAMPLES_S, ShotAsked, ShotReply
+from device.sensor.process import SAMPLES_S, SensorReady, ShotAsked, ShotReply
 from device.sensor.streams import SensorError
 
 START_S = 30.0
@@ -33,19 +33,12 @@ _ENDED_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SensorReady:
-    """A sensor that is heard: samples a second, and their noise at rest."""
-
-    rate_Hz: float
-    noise_m_s2: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SensorSaid:
-    """One thing that the sensor's process says."""
+    """One thing that the sensor's process says. `silent`: no sample comes any more, or one came again."""
 
     ready: SensorReady | None = None
     reply: ShotReply | None = None
+    silent: bool | None = None
     ended: str = ""
 
 
@@ -63,10 +56,11 @@ def asked_of(line: bytes) -> ShotAsked:
 
 
 class SensorEnd(Protocol):
-    """Whoever measures shots for a run. `immediate`: it needs no time to pass."""
+    """Whoever measures shots for a run. `silent`: no sample comes just now; `ended`: why none will come any more."""
 
     address: str
-    immediate: bool
+    silent: bool
+    ended: str
 
     def ask(self, pulse_start_s: float, actuator: Method) -> ShotReply:
         """What was measured of a shot; it waits for it. `SensorError`: it ended, and is asked no more."""
@@ -78,10 +72,8 @@ class SensorEnd(Protocol):
 class SensorLink:
     """A sensor in its own process. `SensorError`: it is refused, and why."""
 
-    immediate = False
-
     def __init__(self, address: str, start_s: float = START_S) -> None:
-        self.address = address
+        self.address, self.silent, self.ended = address, False, ""
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "device.sensor", address],
@@ -154,9 +146,14 @@ class SensorLink:
                     said = _SAID.validate_json(line)
                 except ValidationError:
                     said = SensorSaid(ended="its process said what cannot be")
-                ended = said.ended
-                self._said.put(said)
+                ended = ended or said.ended
+                if said.silent is None:
+                    self._said.put(said)
+                else:
+                    self.silent = said.silent
         if not ended:
             code = self._process.wait()
             how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-            self._said.put(SensorSaid(ended=f"its process {how}"))
+            ended = f"its process {how}"
+            self._said.put(SensorSaid(ended=ended))
+        self.ended = f"{self.address}: {ended}"

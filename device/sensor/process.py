@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
 from device.methods import Method
+from device.physics.hand import Vector
 from device.sensor.expected import expected_shot
 from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
-from device.sensor.streams import Sample
+from device.sensor.streams import Sample, SensorClock
 
 KEPT_S = 5.0
 """Samples of so long are kept."""
@@ -22,6 +24,14 @@ LEAST_RATE_HZ = 1500.0
 MAX_GAP_S = 0.005
 _RATE_STEP = 0.01
 """The rate is taken in steps of 1 %, so that what is expected is reckoned once."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorReady:
+    """A sensor that is heard: samples a second, and their noise at rest."""
+
+    rate_Hz: float
+    noise_m_s2: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,14 +54,19 @@ class ShotReply:
 
 
 class SampleBuffer:
-    """The last samples, and what they show."""
+    """The last samples, and what they show. Times are the sensor's own until a shot is looked for.
+
+    `heard_s`: when the last came, on this machine's clock.
+    """
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque()
+        self._clock = SensorClock()
+        self.heard_s = -np.inf
 
     @property
     def last_s(self) -> float:
-        """The time of the last sample; without end before the first."""
+        """The time of the last sample on the sensor's clock; without end before the first."""
         return self._samples[-1][0] if self._samples else -np.inf
 
     @property
@@ -64,9 +79,13 @@ class SampleBuffer:
         """Samples a second; 0 where there are too few to say."""
         return (len(self._samples) - 1) / self.length_s if self.length_s > 0 else 0.0
 
-    def take(self, samples: Iterable[Sample]) -> None:
-        """Keep new ones, and let old ones go."""
+    def take(self, samples: Sequence[Sample], now_s: float) -> None:
+        """Keep those that came now, and let old ones go."""
+        if not samples:
+            return
         self._samples.extend(samples)
+        self.heard_s = now_s
+        self._clock.heard(self.last_s, now_s)
         while self.length_s > KEPT_S:
             self._samples.popleft()
 
@@ -82,23 +101,29 @@ class SampleBuffer:
             why = "nothing moves in this shot by the model" if self.rate_Hz > LEAST_RATE_HZ else "too few samples"
             return ShotReply(number=shot.number, because=why)
         reply = ShotReply(number=shot.number, expected=expected)
-        end_s = shot.pulse_start_s + expected.until_s
-        if self.last_s < end_s:
+        end_s, times, clock_s = shot.pulse_start_s + expected.until_s, *self._host_times()
+        if times[-1] < end_s:
             late = now_s > end_s + SAMPLES_S
             return replace(reply, because="the sensor gave no samples of it") if late else None
         try:
-            trace = self._trace(shot.pulse_start_s - BEFORE_S, end_s)
+            trace = self._trace(times, clock_s, shot.pulse_start_s - BEFORE_S, end_s)
             return replace(reply, seen=measured(trace, shot.pulse_start_s, expected))
         except ValueError as error:
             return replace(reply, because=str(error))
 
-    def _trace(self, start_s: float, end_s: float) -> SensorTrace:
+    def _host_times(self) -> tuple[Vector, float]:
+        """The times of all samples on this machine's clock, and their uncertainty as a whole."""
+        line = self._clock.line()
+        return line.host_s(np.array([time_s for time_s, _ in self._samples])), line.u_s
+
+    def _trace(self, times: Vector, clock_s: float, start_s: float, end_s: float) -> SensorTrace:
         """The samples of a time. `ValueError`: some are missing."""
-        found = np.array([one for one in self._samples if start_s <= one[0] < end_s]).reshape(-1, 2)
-        gap_s = float(np.diff(found[:, 0], prepend=start_s, append=end_s).max())
+        found = slice(*np.searchsorted(times, (start_s, end_s)).tolist())
+        gap_s = float(np.diff(times[found], prepend=start_s, append=end_s).max())
         if gap_s > MAX_GAP_S:
             raise ValueError(f"its trace has a gap of {gap_s:.3f} s")
-        return SensorTrace(time_s=found[:, 0], acceleration_m_s2=found[:, 1])
+        values = np.array([value for _, value in islice(self._samples, found.start, found.stop)])
+        return SensorTrace(time_s=times[found], acceleration_m_s2=values, clock_s=clock_s)
 
 
 def _stepped(rate_Hz: float) -> float:

@@ -14,7 +14,7 @@ from device.parameters import GunParameters
 from device.physics.hand import Vector
 from device.sensor.expected import FINE_S, expected_shot, modelled_acceleration
 from device.sensor.measuring import BEFORE_S, SensorTrace, measured
-from device.sensor.process import ShotReply
+from device.sensor.process import SensorReady, ShotReply
 from device.sensor.streams import SensorError
 
 RATE_HZ = 3200.0
@@ -22,7 +22,13 @@ NOISE_M_S2 = 0.1
 """Of an accelerometer of low noise, 10 mg (assumed)."""
 _LONG_S = 0.15
 """Past the turn of every magnet, and what a shot may be late."""
-_KEYS = ("slip", "after", "noise")
+_RULES = {
+    "slip": (1.0, "from 0 to 1, the part of the friction that is lost"),
+    "after": (1e6, "a number of shots, from 0 to 1000000"),
+    "noise": (1e3, "from 0 to 1000, in m/s²"),
+}
+"""The most of each key, and the rule."""
+_EXAMPLE = "simulated:slip=0.1,after=30"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,25 +49,45 @@ def drill_of(rest: str) -> SensorDrill:
     values = dict[str, float]()
     for word in filter(None, rest.split(",")):
         name, _, value = word.partition("=")
+        if name not in _RULES:
+            raise SensorError(f"simulated:{word}: there is no {name!r}; give {', '.join(_RULES)}, as in {_EXAMPLE}")
+        if name in values:
+            raise SensorError(f"simulated:{rest}: {name} is given twice; give it once, as in {_EXAMPLE}")
         try:
-            if name not in _KEYS or not 0 <= float(value) < np.inf or (name == "slip" and float(value) > 1):
-                raise ValueError
             values[name] = float(value)
         except ValueError:
-            raise SensorError(
-                f"simulated:{word}: give {', '.join(_KEYS)} as a number, as in slip=0.1,after=30"
-            ) from None
+            raise SensorError(f"simulated:{word}: {value!r} is no number; give one, as in {_EXAMPLE}") from None
+        most, rule = _RULES[name]
+        if not 0 <= values[name] <= most:
+            raise SensorError(f"simulated:{word}: {name} is {value}; it must be {rule}")
     return SensorDrill(**values)
+
+
+def measures_by_model(address: str) -> bool:
+    """Whether an address is the simulated sensor's."""
+    return address.partition(":")[0] == "simulated"
+
+
+def checked_drill(address: str, gun: str) -> SensorDrill:
+    """The drill of an address. `SensorError`: it is none, or the gun is one that the model cannot measure."""
+    if gun != "simulated":
+        raise SensorError(f"{address}: goes with --gun simulated; it would measure nothing of {gun}")
+    return drill_of(address.partition(":")[2])
+
+
+def ready_of(address: str, gun: str) -> SensorReady:
+    """Its rate and noise. Raises as `checked_drill`."""
+    return SensorReady(rate_Hz=RATE_HZ, noise_m_s2=checked_drill(address, gun).noise)
 
 
 class SimulatedSensor:
     """Measures by the model; its noise, and where its samples lie, come from `random`."""
 
-    immediate = True
+    silent, ended = False, ""
 
-    def __init__(self, address: str, random: np.random.Generator) -> None:
+    def __init__(self, address: str, gun: str, random: np.random.Generator) -> None:
         self.address = address
-        self._drill = drill_of(address.partition(":")[2])
+        self._drill = checked_drill(address, gun)
         self._random, self._shots = random, 0
         self._courses: dict[Method, Vector] = {}
         self._fine = np.arange(-BEFORE_S, _LONG_S, FINE_S)

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from device.physics.hand import Vector
 from device.words import DeviceError, is_finite
 
 Sample = tuple[float, float]
-"""Seconds on the host's monotonic clock, and m/s2 along the barrel, recoil positive."""
+"""Seconds on the sensor's own clock, which never go back, and m/s2 along the barrel, recoil positive."""
 MAX_BYTES = 1 << 16
-DRIFT = 2e-4
+CLOCK_DRIFT = 0.01
 """So much faster or slower than this machine's a sensor's clock may go (assumed)."""
+ARRIVALS_S = 20.0
+"""Arrivals of so long tell how the clocks stand."""
+_SLOPES = 41
+_REFINED = 3
+_NEAREST = 8
 
 
 class SensorError(DeviceError):
@@ -27,6 +36,8 @@ class Sensor(Protocol):
     def read(self) -> Sequence[Sample]:
         """The samples since the last call, in order; none if there are none yet. It may wait 0.1 s for them.
 
+        They may come in batches: when a sample came does not matter as long as some come soon.
+
         An exception, or `EOFError` for a stream that is over, ends the measuring.
         """
 
@@ -34,41 +45,78 @@ class Sensor(Protocol):
         """Let go of it."""
 
 
-class SensorClock:
-    """Times of a sensor's own clock put on this machine's, by the samples that came soonest.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClockLine:
+    """How a sensor's clock stands to this machine's: host = sensor + offset_s + drift (sensor - at_s).
 
-    What comes late was on its way for longer; nothing comes before it was measured. Of a transport's least delay
-    nothing is known: times are late by it.
+    `u_s`: the standard uncertainty of times near the last ones.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
-        self._offset_s, self._at_s = math.inf, -math.inf
+    offset_s: float
+    drift: float
+    at_s: float
+    u_s: float
 
-    def host_times(self, sensor_s: Sequence[float]) -> list[float]:
-        """When, on this machine's clock, samples were measured that all came just now, in order."""
-        if not sensor_s:
-            return []
-        now_s = self._clock()
-        grown_s = self._offset_s + DRIFT * (now_s - self._at_s) if math.isfinite(self._offset_s) else math.inf
-        self._offset_s, self._at_s = min(grown_s, now_s - sensor_s[-1]), now_s
-        return [one + self._offset_s for one in sensor_s]
+    def host_s(self, sensor_s: Vector) -> Vector:
+        """Times of the sensor's clock on this machine's."""
+        return sensor_s + self.offset_s + self.drift * (sensor_s - self.at_s)
+
+
+class SensorClock:
+    """A sensor's clock beside this machine's, by when its samples came.
+
+    A sample comes after it was measured, sooner or later: arrival less stamp lies above the offset of the clocks, and
+    those that came soonest lie on it. So the offset is the straight line under all of them that is highest in their
+    middle, which lines that come in batches, in bursts or after a pause do not move. As many as lie a little above the
+    line, so far it may lie above the truth: its uncertainty. Of a transport's least delay nothing is known: times are
+    late by it.
+
+    Source: the linear bound of Moon, Skelly and Towsley, Proc. IEEE INFOCOM 1999.
+    """
+
+    def __init__(self) -> None:
+        self._arrivals = deque[tuple[float, float]]()
+
+    def heard(self, sensor_s: float, now_s: float) -> None:
+        """The newest sample came now."""
+        self._arrivals.append((sensor_s, now_s - sensor_s))
+        while sensor_s - self._arrivals[0][0] > ARRIVALS_S:
+            self._arrivals.popleft()
+
+    def line(self) -> ClockLine:
+        """How the clocks stand. `ValueError`: nothing came yet."""
+        if not self._arrivals:
+            raise ValueError("no sample came yet")
+        stamps, offsets = np.array(self._arrivals).T
+        at_s, span_s = float(stamps.mean()), float(np.ptp(stamps))
+        drift, reach = 0.0, CLOCK_DRIFT if span_s > 0 else 0.0
+        for _ in range(_REFINED):
+            drifts = np.clip(drift + np.linspace(-reach, reach, _SLOPES), -CLOCK_DRIFT, CLOCK_DRIFT)
+            heights = (offsets - drifts[:, None] * (stamps - at_s)).min(axis=1)
+            drift, reach = float(drifts[heights.argmax()]), 2 * reach / (_SLOPES - 1)
+        above = offsets - drift * (stamps - at_s)
+        lowest = np.sort(above)[: _NEAREST + 1]
+        return ClockLine(
+            offset_s=float(lowest[0]), drift=drift, at_s=at_s, u_s=float(lowest[-1] - lowest[0]) if span_s else 0.0
+        )
 
 
 class CsvSensor:
-    """Lines `time_s,acceleration_m_s2` on the sensor's own clock, from a file that grows, a pipe or a device.
+    """Lines `time_s,acceleration_m_s2`, from a file that grows, a pipe or a device.
 
     What is there already is passed over; so are lines of words, such as a header, before the first of numbers.
     """
 
-    def __init__(self, path: str, clock: Callable[[], float]) -> None:
+    def __init__(self, path: str) -> None:
+        if not path:
+            raise SensorError("names no file; give one, as in csv:/dev/ttyACM0")
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_NOCTTY", 0))
         except OSError as error:
             raise SensorError(f"cannot be opened ({error.strerror})") from error
         with suppress(OSError):  # a pipe has no end to go to
             os.lseek(self._descriptor, 0, os.SEEK_END)
-        self._clock, self._rest, self._begun = SensorClock(clock), b"", False
+        self._rest, self._begun = b"", False
 
     def read(self) -> Sequence[Sample]:
         """The samples of the whole lines since the last call. `SensorError` names a line that is none."""
@@ -79,10 +127,9 @@ class CsvSensor:
         except OSError as error:
             raise SensorError(f"cannot be read any more ({error.strerror})") from error
         *lines, self._rest = (self._rest + data).split(b"\n")
-        found = list(self._numbers(lines))
-        return list(zip(self._clock.host_times([one for one, _ in found]), (value for _, value in found), strict=True))
+        return list(self._numbers(lines))
 
-    def _numbers(self, lines: list[bytes]) -> Iterator[tuple[float, float]]:
+    def _numbers(self, lines: list[bytes]) -> Iterator[Sample]:
         for line in filter(None, map(bytes.strip, lines)):
             try:
                 time_s, acceleration = map(float, line.split(b","))
@@ -102,7 +149,7 @@ class CsvSensor:
 def checked_samples(who: str, said: object, after_s: float) -> list[Sample]:
     """What a sensor gave back, if it can be. `SensorError` names the rule that it breaks.
 
-    Times may not go back by more than the clock's own corrections do, 1 ms; then they are put in order.
+    Its times may not go back; of samples with the same time the first is taken.
     """
     if not isinstance(said, Sequence):
         raise SensorError(f"{who}: read gave back {said!r:.60}; it must be a sequence of (time_s, acceleration_m_s2)")
@@ -111,7 +158,7 @@ def checked_samples(who: str, said: object, after_s: float) -> list[Sample]:
         if not (isinstance(one, Sequence) and len(one) == 2 and all(map(is_finite, one))):
             raise SensorError(f"{who}: a sample is {one!r:.60}; it must be two finite numbers, time_s and m/s2")
         time_s = float(one[0])
-        if time_s < after_s - 1e-3:
+        if time_s < after_s:
             raise SensorError(f"{who}: its time went back from {after_s:.6f} s to {time_s:.6f} s")
         if time_s > after_s:
             found.append((time_s, float(one[1])))

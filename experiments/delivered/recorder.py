@@ -9,7 +9,7 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from device.methods import Method
 from device.parameters import GunParameters
 from device.sensor.link import SensorEnd, SensorLink
 from device.sensor.process import ShotReply
-from device.sensor.simulated import SimulatedSensor
+from device.sensor.simulated import SimulatedSensor, measures_by_model
 from device.sensor.streams import SensorError
 from device.words import Identity, Pulse
 from experiments.clock import Clock
@@ -30,6 +30,8 @@ from experiments.session.remarks import NOT_DELIVERED, DeliveryMark, Noted, Rema
 from experiments.session.states import ARMED, Position, State
 from experiments.session.steps import FireShot, Outcome, Present, Repeated, Step
 
+NOTICED_S = 0.25
+"""So often it is looked whether the sensor is still heard, and what is to be told of a presentation that is over."""
 SETTLED_S = 8.0
 """So long the end of a run waits for what was measured last."""
 REPEAT_REASON = "not delivered"
@@ -50,16 +52,15 @@ def open_recorder(
     address: str, gun: str, methods: Mapping[str, Method], clock: Clock, *, again: bool, random: np.random.Generator
 ) -> Iterator[ShotRecorder]:
     """The recorder of a run. `SensorError`: the sensor is refused, or can measure no such gun on no such clock."""
-    simulated = address.partition(":")[0] == "simulated"
-    if simulated and gun != "simulated":
-        raise SensorError(f"--sensor {address}: goes with --gun simulated; it would measure nothing of {gun}")
+    simulated = measures_by_model(address)
     if not simulated and clock.name != "real":
         raise SensorError(
-            f"--sensor {address}: measures in real time, and this run's clock is {clock.name}; use a screen for people "
-            "and a gun that takes its time, or --sensor simulated"
+            f"--sensor {address}: measures in real time, and this run's clock is {clock.name}; give --sensor "
+            "simulated, or --screen terminal or console with a gun that takes its time (with --screen synthetic none "
+            "passes)"
         )
     try:
-        end: SensorEnd = SimulatedSensor(address, random) if simulated else SensorLink(address)
+        end: SensorEnd = SimulatedSensor(address, gun, random) if simulated else SensorLink(address)
     except SensorError as error:
         raise SensorError(f"--sensor {error}") from error
     recorder = ShotRecorder(end, methods, beside=clock.name != "virtual", again=again)
@@ -81,7 +82,9 @@ class ShotRecorder:
         self._levels: dict[tuple[str, str], DeliveryLevel] = {}
         self._step: Step | None = None
         self._shots = 0
-        self._ended = False
+        self._ended = self._silent = False
+        self._undelivered: list[ShotMeasured] = []
+        self._latest: ShotFired | None = None
         self._spoiled: Repeated | None = None
         self._thread = threading.Thread(target=self._work, daemon=True, name="delivered")
 
@@ -117,11 +120,18 @@ class ShotRecorder:
         if self._thread.is_alive():
             self._fired.put(None)
             self._thread.join(SETTLED_S)
+        self._tell_undelivered()
         self._live = None
 
     def close(self) -> None:
         """Let go of the sensor."""
         self._end.close()
+
+    def shown(self) -> None:
+        """The run stands somewhere else: what waited for that is done."""
+        self.offer_again()
+        if not self._beside:
+            self._look()
 
     def offer_again(self) -> None:
         """Ask for a spoiled trial again, if it can be presented now; let it go when it cannot any more."""
@@ -138,17 +148,39 @@ class ShotRecorder:
     # in the thread beside
 
     def _work(self) -> None:
-        while (shot := self._fired.get()) is not None:
+        while (shot := self._next()) is not None:
             self._record(shot)
+            self._look()
+
+    def _next(self) -> ShotFired | None:
+        while True:
+            with suppress(queue.Empty):
+                return self._fired.get(timeout=NOTICED_S)
+            self._look()
+
+    def _look(self) -> None:
+        """Tell what there is to tell, once."""
+        if self._end.ended and not self._ended:
+            self._end_of_sensor(self._end.ended)
+        if self._end.silent != self._silent and not self._ended:
+            self._silent = self._end.silent
+            self._note(_SILENT if self._silent else _HEARD)
+        live = self._live
+        over = live is None or self._latest is None or live.position.step is not self._latest.step
+        if over and self._fired.empty():
+            self._tell_undelivered()
 
     def _record(self, shot: ShotFired) -> None:
         live = self._live
         if live is None:
             return
-        found = self._measured(shot)
+        if self._latest is not None and shot.step is not self._latest.step:
+            self._tell_undelivered()
+        self._latest, found = shot, self._measured(shot)
         live.remark(found)
         if found.mark in NOT_DELIVERED:
-            self._tell(live, found)
+            self._undelivered.append(found)
+            self._want_again(live, found)
             self.offer_again()
 
     def _measured(self, shot: ShotFired) -> ShotMeasured:
@@ -213,24 +245,38 @@ class ShotRecorder:
             f"{what} {value:.3g} {unit}, {100 * (part / level.mean - 1):+.0f} % from the shots before" if mark else "",
         )
 
-    def _tell(self, live: LiveRun, found: ShotMeasured) -> None:
-        """Tell the experimenter; where the design says so, the trial is to come again, once."""
+    def _want_again(self, live: LiveRun, found: ShotMeasured) -> None:
+        """Where the design says so, the trial is to come again, once."""
         before = (word for _, word in live.history if isinstance(word, Repeated) and word.trial == found.trial)
-        again = self._again and not any(word.reason.startswith(REPEAT_REASON) for word in before)
-        if again:
+        if self._again and not any(word.reason.startswith(REPEAT_REASON) for word in before):
             self._spoiled = Repeated(trial=found.trial, reason=f"{REPEAT_REASON}: {found.because}")
+
+    def _tell_undelivered(self) -> None:
+        """Tell the experimenter of a presentation's shots that were not delivered, in one line."""
+        told, self._undelivered = self._undelivered, []
+        if not told or self._latest is None:
+            return
+        first, fired = told[0], self._latest.shot
+        some = "The shot was" if fired == 1 else f"{len(told)} of {fired} shots were"
         self._trouble(
-            f"Trial {found.trial.trial} was not delivered as {found.method} should be: {found.because}. "
-            f"Look at the damper and the coil."
+            f"Trial {first.trial.trial}: {some} not delivered as {first.method} should be: {first.because}. "
+            "Look at the damper, the coil and the sensor."
         )
 
     def _end_of_sensor(self, why: str) -> None:
         """Said once; the run goes on without it."""
         self._ended = True
-        text = f"The sensor ended ({why}). The run goes on; its shots are marked “not-measured”."
+        self._note(f"The sensor ended ({why}). The run goes on; its shots are marked “not-measured”.")
+
+    def _note(self, text: str) -> None:
+        """Tell the experimenter, and have it on record."""
         self._trouble(text)
         if self._live is not None:
             self._live.remark(Noted(trial=None, text=text))
+
+
+_SILENT = "The sensor is silent: no sample comes. The run goes on; its shots are marked “not-measured” until one does."
+_HEARD = "The sensor is heard again."
 
 
 def driven(actuator: Method, shot: Shot) -> Method:
@@ -287,7 +333,7 @@ class MeasuredScreen:
     def show(self, position: Position) -> None:
         """Show a position."""
         self._screen.show(position)
-        self._recorder.offer_again()
+        self._recorder.shown()
 
     def act(self, position: Position, until_s: float | None) -> None:
         """The run waits now."""

@@ -215,7 +215,7 @@ def checks(
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
         **({"shots": partial(_shots, gun, shots)} if shots else {}),
-        **({"sensor": partial(_sensor, sensor, friction_N)} if sensor else {}),
+        **({"sensor": partial(_sensor, sensor, gun, friction_N)} if sensor else {}),
         "USB adapter": lambda: (verdicts.of_adapters(adapters()),),
         "display": partial(_on_display, "display", "display"),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
@@ -283,16 +283,17 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
     return (verdicts.of_conformance(kept),)
 
 
-def _sensor(address: str, friction_N: float) -> tuple[DoctorFinding, ...]:
-    """A sensor at rest."""
+def _sensor(address: str, gun: str, friction_N: float) -> tuple[DoctorFinding, ...]:
+    """A sensor at rest; of the simulated one, what it says of itself. `DeviceError`: it is refused."""
     from device.physics.hand import HandMechanics  # noqa: PLC0415 - as below
-    from device.sensor import link, measuring  # noqa: PLC0415 - what few rigs have, and slow to import
+    from device.sensor import link, measuring, simulated  # noqa: PLC0415 - what few rigs have, and slow to import
     from experiments.delivered.marks import shots_to_see  # noqa: PLC0415
 
-    if address.partition(":")[0] == "simulated":
-        raise PlaceError("--sensor simulated: there is nothing to look at; give csv:PATH or a plug-in's NAME:...")
-    with closing(link.SensorLink(address)) as sensor:
-        ready = sensor.ready
+    if simulated.measures_by_model(address):
+        ready = simulated.ready_of(address, gun)
+    else:
+        with closing(link.SensorLink(address)) as sensor:
+            ready = sensor.ready
     uncertain_N = measuring.friction_uncertainty_N(ready.noise_m_s2, ready.rate_Hz, HandMechanics().enclosure_mass_kg)
     seen = shots_to_see(uncertain_N / friction_N) if friction_N else None
     found = SensorFigures(sensor=address, rate_Hz=ready.rate_Hz, noise_m_s2=ready.noise_m_s2, shots_to_see=seen)

@@ -80,6 +80,13 @@ def simulate(
     show(found, "\n".join(map(in_text, feature.sections(found))), as_json)
 
 
+def sensor_address(address: str | None) -> str | None:
+    """A sensor's address as it was given. `BadParameter`: it was given, and is empty."""
+    if address is not None and not address.strip():
+        raise typer.BadParameter("is empty; give csv:PATH, a plug-in's NAME:... or simulated, or leave --sensor out")
+    return address
+
+
 def twin(
     gun: GunConfigOption = "gun",
     link: Annotated[Path | None, typer.Option(help="A path that leads to its pseudo-terminal and stays.")] = None,
@@ -114,8 +121,12 @@ def doctor(
         int, typer.Option(min=0, metavar="TRIALS", help="Fire it so often, and see that it keeps what every gun keeps.")
     ] = 0,
     sensor: Annotated[
-        str, typer.Option(help="A sensor of what is delivered: `csv:PATH` or a plug-in's `NAME:...`.")
-    ] = "",
+        str | None,
+        typer.Option(
+            callback=sensor_address,
+            help="A sensor of what is delivered: `csv:PATH`, a plug-in's `NAME:...` or `simulated`.",
+        ),
+    ] = None,
     gun_config: Annotated[
         str,
         typer.Option(help="Config of the gun, with the limit of its line's round trip (serial.round_trip_limit_s)."),
@@ -135,7 +146,7 @@ def doctor(
     from recoil import rig as feature
 
     asked = None if language is None else LanguageAsked(code=language, folder=catalogues)
-    found = feature.examine(results, gun, gun_config, progress, shots=fire, sensor=sensor, asked=asked)
+    found = feature.examine(results, gun, gun_config, progress, shots=fire, sensor=sensor or "", asked=asked)
     show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)

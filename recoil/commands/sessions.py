@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from analysis.report.terminal import AsJsonOption, SeedOption, each_of, end, say, show
+from recoil.commands.guns import sensor_address
 
 
 class ScreenChoice(StrEnum):
@@ -40,7 +41,10 @@ ParticipantOption = Annotated[
 ]
 GunAddressOption = Annotated[str, typer.Option(help="`simulated`, `serial:PORT` or a plug-in's `NAME:...`.")]
 SensorOption = Annotated[
-    str, typer.Option(help="Measure what is delivered: `csv:PATH`, a plug-in's `NAME:...` or `simulated`.")
+    str | None,
+    typer.Option(
+        callback=sensor_address, help="Measure what is delivered: `csv:PATH`, a plug-in's `NAME:...` or `simulated`."
+    ),
 ]
 ScreenOption = Annotated[ScreenChoice, typer.Option(help="Where the run takes place.")]
 ResultsOption = Annotated[Path, typer.Option(help="Folder for the logs.")]
@@ -79,7 +83,7 @@ def run(
     config: Annotated[str, typer.Argument(help="File or name of a shipped config.")],
     participant: ParticipantOption = None,
     gun: GunAddressOption = "simulated",
-    sensor: SensorOption = "",
+    sensor: SensorOption = None,
     screen: ScreenOption = ScreenChoice.terminal,
     results: ResultsOption = Path("results"),
     seed: SeedOption = None,
@@ -108,7 +112,7 @@ def run(
         participant_id=participant or "",
         results=results,
         gun=gun,
-        sensor=sensor,
+        sensor=sensor or "",
         seed=seed,
         again=session.again(resume=resume, fresh=fresh, reason=reason),
         anew_reason=reason,

@@ -3,12 +3,9 @@
 It sends a line `microseconds,x_mg` for each sample, its own clock first; x is along the barrel, recoil positive.
 """
 
-import time
 from collections.abc import Callable
 
 import serial
-
-from device.sensor.streams import SensorClock
 
 BAUD = 2_000_000
 MG = 9.80665e-3
@@ -16,16 +13,13 @@ MG = 9.80665e-3
 
 
 class SerialAccelerometer:
-    def __init__(self, port: str, clock: Callable[[], float]) -> None:
-        self._port = serial.Serial(port, BAUD, timeout=0)
-        self._clock, self._rest = SensorClock(clock), b""
+    def __init__(self, port: str) -> None:
+        self._port, self._rest = serial.Serial(port, BAUD, timeout=0), b""
         self._wraps, self._last_us = 0, 0
 
     def read(self) -> list[tuple[float, float]]:
         *lines, self._rest = (self._rest + self._port.read(65_536)).split(b"\n")
-        found = [sample for line in lines if (sample := self._sample(line)) is not None]
-        times = self._clock.host_times([time_s for time_s, _ in found])
-        return list(zip(times, (value for _, value in found), strict=True))
+        return [sample for line in lines if (sample := self._sample(line)) is not None]
 
     def _sample(self, line: bytes) -> tuple[float, float] | None:
         try:
@@ -45,5 +39,5 @@ class SerialAccelerometer:
         self._port.close()
 
 
-def open_sensor(address: str, clock: Callable[[], float] = time.monotonic) -> SerialAccelerometer:
-    return SerialAccelerometer(address, clock)
+def open_sensor(address: str, _clock: Callable[[], float]) -> SerialAccelerometer:
+    return SerialAccelerometer(address)  # which has a clock of its own
