@@ -1,7 +1,8 @@
-"""The reference of tests/test_physics_reference.py: `python tests/golden/make_physics.py`, about a minute.
+"""The reference of tests/test_physics_reference.py: `python tests/golden/make_physics.py`, some seconds.
 
-`python tests/golden/make_physics.py far` makes that of the guns in physics_far.json, ten minutes: guns of
-three decades about the paper's, whose magnet creeps home.
+`python tests/golden/make_physics.py far` makes that of the guns in physics_far.json, some minutes: guns of three
+decades about the paper's, whose magnet creeps home. `python tests/golden/make_physics.py random` draws 200 guns that
+shoot as the paper's does and makes physics_random.csv, some minutes.
 
 Equations (1) to (3) in 60-digit arithmetic (mpmath), by another method than the product's: Taylor series of order 70
 in plain time over every motion, the free flight included (the product has it in closed form), one half of the radius
@@ -10,12 +11,14 @@ a step, events by bisection of sign changes and secant steps. Nothing of the pro
 
 from __future__ import annotations
 
+import csv
 import json
+import random
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from mpmath import exp, log, mp, mpf
+from mpmath import exp, fdot, log, mp, mpf
 
 mp.dps = 60
 ORDER = 70
@@ -42,10 +45,10 @@ def series(now, state):
     x, v, i = ([c] for c in state)
     hold = [1 - x[0] / X_C]
     for n in range(ORDER):
-        motor = K_M * sum(hold[j] * i[n - j] for j in range(n + 1)) if now.inside and now.live else mpf(0)
+        motor = K_M * fdot(hold, i[::-1]) if now.inside and now.live else mpf(0)
         emf = v[n]
         if now.reciprocal:
-            emf = sum(hold[j] * v[n - j] for j in range(n + 1)) if now.inside else mpf(0)
+            emf = fdot(hold, v[::-1]) if now.inside else mpf(0)
         first = n == 0
         x.append(v[n] / (n + 1))
         hold.append(-x[-1] / X_C)
@@ -71,8 +74,14 @@ def span_of(all_series):
     return min(spans) / 2
 
 
-def crossing(function, span):
+def crossing(c, span):
     """The first change of sign from that just after 0, looked for in 64 parts; None if there is none."""
+    if abs(c[0]) > at([abs(a) for a in c[1:]], span) * span:
+        return None  # the first coefficient outweighs all others
+
+    def function(t):
+        return at(c, t)
+
     times = [span * n / 64 for n in range(65)]
     times[0] = span / mpf(10) ** 12
     values = [function(t) for t in times]
@@ -103,11 +112,11 @@ def fly(now, t, state, found):
         span, name = span_of(s), None
         if t + span > now.limit:
             span, name = now.limit - t, "limit"
-        watched = {"turn": lambda h, v=s[1]: at(v, h)}
+        watched = {"turn": s[1]}
         if now.way < 0 or (now.inside and now.live):
-            watched["arrival"] = lambda h, x=s[0]: at(x, h) - target
-        for event, function in watched.items():
-            h = crossing(function, span)
+            watched["arrival"] = [s[0][0] - target, *s[0][1:]]
+        for event, c in watched.items():
+            h = crossing(c, span)
             if h is not None and h < span:
                 span, name = h, event
         if "recoil_end_s" not in found:
@@ -119,20 +128,26 @@ def fly(now, t, state, found):
 
 def note_peak(now, s, span, found):
     slope = [(n + 1) * (n + 2) * s[1][n + 2] for n in range(ORDER - 1)]
-    top = crossing(lambda t: at(slope, t), span)
+    top = crossing(slope, span)
     for t in (span, *([top] if top else [])):
         x, i = at(s[0], t), at(s[2], t)
         force = K_M * (1 - x / X_C) * i - K * (x + X_0) - now.friction
         found["peak_force_N"] = max(found.get("peak_force_N", mpf(0)), force)
 
 
-def shot(now):
+def shot(now, order=()):
+    """The numbers of a shot; None if its events are not those of `order`, where one is given."""
     threshold = (K * X_0 + now.friction) / K_M
+    if threshold * R >= VOLTAGE:
+        return None
     t = -L / R * log(1 - threshold * R / VOLTAGE)
     assert abs(VOLTAGE / R * (1 - exp(-t * R / L)) - threshold) < mpf(10) ** -55
-    state, found = [mpf(0), mpf(0), threshold], {}
+    state, found, names = [mpf(0), mpf(0), threshold], {}, []
     while "reset_end_s" not in found:
         name, t, state = fly(now, t, state, found)
+        names.append(name)
+        if order and names != list(order[: len(names)]):
+            return None
         now = after(now, name, t, state, found)
     return {name: mp.nstr(number, DIGITS) for name, number in found.items()}
 
@@ -155,22 +170,25 @@ def after(now, name, t, state, found):
     return now
 
 
+NAMES = {
+    "M": "magnet_mass_kg",
+    "K_E": "back_emf_V_s_m",
+    "R": "resistance_ohm",
+    "L": "inductance_H",
+    "K_M": "motor_constant_N_A",
+    "X_C": "coil_reach_m",
+    "K": "stiffness_N_m",
+    "X_0": "preload_length_m",
+    "VOLTAGE": "voltage_V",
+    "PULSE": "pulse_s",
+    "X_K": "contact_depth_m",
+}
+PAPER = {key: float(globals()[name]) for name, key in NAMES.items()}
+
+
 def use(gun):
     """The gun's own numbers, exact as doubles, in place of the paper's."""
-    names = {
-        "M": "magnet_mass_kg",
-        "K_E": "back_emf_V_s_m",
-        "R": "resistance_ohm",
-        "L": "inductance_H",
-        "K_M": "motor_constant_N_A",
-        "X_C": "coil_reach_m",
-        "K": "stiffness_N_m",
-        "X_0": "preload_length_m",
-        "VOLTAGE": "voltage_V",
-        "PULSE": "pulse_s",
-        "X_K": "contact_depth_m",
-    }
-    globals().update({name: mpf(gun[key]) for name, key in names.items()})
+    globals().update({name: mpf(gun[key]) for name, key in NAMES.items()})
 
 
 def far():
@@ -186,6 +204,53 @@ def far():
     file.write_text(json.dumps(page, indent=1) + "\n", encoding="utf-8")
 
 
+COUNT, SEED = 200, 18
+AS_THE_PAPERS = {
+    "open": ("arrival", "limit", "turn", "arrival"),
+    "shorted": ("arrival", "limit", "turn", "arrival", "arrival"),
+}
+"""Events of the paper's gun: out of the coil within the pulse, its end, the turn, (the coil's edge), the stop."""
+
+
+def random_guns():
+    """Each number half to twice the paper's, friction a tenth to four fifths of the spring's pre-load."""
+    rng = random.Random(SEED)
+    while True:
+        gun = {key: float(f"{value * 2 ** rng.uniform(-1, 1):.4g}") for key, value in PAPER.items()}
+        share = rng.uniform(0.1, 0.8)
+        yield gun | {"friction_N": float(f"{share * gun['stiffness_N_m'] * gun['preload_length_m']:.4g}")}
+
+
+def one_row(gun):
+    """The gun and its numbers, those of the landing by the coil's off-state; None if it shoots otherwise."""
+    use(gun)
+    row = gun
+    for drive_off, order in AS_THE_PAPERS.items():
+        found = shot(Motion(mpf(gun["friction_N"]), drive_off == "shorted", False, u=VOLTAGE, limit=PULSE), order)
+        if found is None:
+            return None
+        landing = ("reset_end_s", "impact_speed_m_s")
+        named = {f"{drive_off}_{name}" if name in landing else name: found[name] for name in found}
+        del named["collision_force_N"]
+        digits = {name: mp.nstr(mpf(number), 20) for name, number in named.items()}
+        assert all(row.get(name, number) == number for name, number in digits.items())
+        row = row | digits
+    return row
+
+
+def at_random():
+    rows = []
+    for gun in random_guns():
+        row = one_row(gun)
+        rows += [row] if row else []
+        if len(rows) == COUNT:
+            break
+    with Path(__file__).with_name("physics_random.csv").open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, rows[0], lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+
+
 def main():
     shots = []
     for friction in ("0.21", "1.12"):
@@ -199,4 +264,4 @@ def main():
 
 
 if __name__ == "__main__":
-    far() if sys.argv[1:] == ["far"] else main()
+    {"": main, "far": far, "random": at_random}["".join(sys.argv[1:])]()
