@@ -12,7 +12,7 @@ from device.physics.scenes import OUTPUTS
 from tests.benchmarks.flops import counting_floats, operations
 from tests.benchmarks.leads import leads
 from tests.benchmarks.ours import Contender, Ready, one_at_a_time
-from tests.benchmarks.problem import OFF_STATES, Outputs, PeerError, errors, guns, reference
+from tests.benchmarks.problem import OFF_STATES, Outputs, PeerError, errors, guns, papers_shots, reference
 from tests.benchmarks.registry import peers
 from tests.benchmarks.timing import Row, measure
 
@@ -82,11 +82,11 @@ def test_floats_that_count_count_every_operation_and_stay_what_they_are() -> Non
 def test_a_shot_takes_at_least_the_products_of_its_series() -> None:
     """Each of some 8 steps of order 24 has one Cauchy product a coefficient: 24 * 25 / 2 multiplications."""
     for drive_off in OFF_STATES:
-        assert operations(drive_off)["multiplications"] > 8 * 24 * 25 / 2
+        assert operations(guns(drive_off))["multiplications"] > 8 * 24 * 25 / 2
 
 
 def test_a_peer_that_is_missing_or_fails_is_a_row_and_stops_nobody() -> None:
-    def broken(_drive_off: object) -> Ready:
+    def broken(_shots: object) -> Ready:
         raise PeerError("an event was missed")
 
     def contender(family: str, package: str, prepare: Any, *, is_peer: bool = True) -> Contender:
@@ -95,14 +95,14 @@ def test_a_peer_that_is_missing_or_fails_is_a_row_and_stops_nobody() -> None:
     absent = contender("absent", "no_such_package_at_all", broken)
     failing = contender("failing", "recoil", broken)
     ours = contender("ours", "recoil", one_at_a_time, is_peer=False)
-    rows = measure([absent, failing, ours], "open", 1)
+    rows = measure([absent, failing, ours], papers_shots("open"), 1)
     assert [row.status for row in rows] == ["not installed", "failed", "measured"]
     assert "--group peers" in rows[0].note
     assert "an event was missed" in rows[1].note
     assert rows[2].error is not None
     assert rows[2].error < 1e-12
     with pytest.raises(PeerError):  # what is ours must not hide behind a row
-        measure([contender("ours", "recoil", broken, is_peer=False)], "open", 1)
+        measure([contender("ours", "recoil", broken, is_peer=False)], papers_shots("open"), 1)
 
 
 def test_a_lead_is_the_fastest_exact_setting_and_says_whether_it_is_what_was_wanted() -> None:

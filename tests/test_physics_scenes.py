@@ -16,6 +16,7 @@ from device.physics import FIDELITIES, SCENES, GunParameters, Scene, choose_mode
 from device.physics.hand import compliant_collision, rigid_collision
 from device.physics.scenes import COSTS, FRICTION_N, NEAR, NEEDED, choose_contact, stated_error
 from tests.benchmarks.flops import operations
+from tests.benchmarks.problem import guns
 from tests.conftest import Recoil
 from tests.extreme_guns import NUMBERS, OPTIONS, PAPER
 
@@ -103,7 +104,7 @@ def test_an_output_or_error_that_makes_no_sense_is_named(needs: dict[str, float]
 @pytest.mark.parametrize("drive_off", ["open", "shorted"])
 def test_the_order_of_costs_is_that_of_the_operations_counted(drive_off: DriveOff) -> None:
     assert sorted(COSTS) == sorted(FIDELITIES)
-    counts = [sum(operations(drive_off, fidelity).values()) for fidelity in COSTS]
+    counts = [sum(operations(guns(drive_off), fidelity).values()) for fidelity in COSTS]
     assert counts == sorted(counts)
 
 

@@ -10,13 +10,12 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from device.parameters import DriveOff
+from device.parameters import GunParameters
 from device.physics.equations import Constants, model_number, pack
 from device.physics.shot import interpret
-from tests.benchmarks.problem import guns
 
 _KINDS = {"add": "additions", "sub": "additions", "mul": "multiplications", "truediv": "divisions"}
 
@@ -36,10 +35,9 @@ print(2.0 * n**3 / best)
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
-def operations(drive_off: DriveOff, fidelity: str = "full") -> dict[str, float]:
-    """By kind, the operations of one shot: the mean of the paper's two guns."""
+def operations(asked: Sequence[GunParameters], fidelity: str = "full") -> dict[str, float]:
+    """By kind, the operations of one shot: the mean of these guns."""
     number, tally = counting_floats()
-    asked = guns(drive_off)
     for gun in asked:
         constants = pack(gun, model_number(fidelity))
         interpret(Constants(*(number(value) if type(value) is float else value for value in constants)))

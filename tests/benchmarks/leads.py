@@ -8,7 +8,7 @@ from typing import Any
 
 from tests.benchmarks import flops as bench_flops
 from tests.benchmarks.ours import BATCH, SINGLE, contender_of, contenders
-from tests.benchmarks.problem import OFF_STATES
+from tests.benchmarks.problem import OFF_STATES, guns, papers_shots
 from tests.benchmarks.registry import peers
 from tests.benchmarks.timing import Row, measure
 
@@ -45,7 +45,7 @@ def compare(repeats: int, batch: int, seed: int) -> dict[str, Any]:
     entrants = [*contenders(batch, seed), *(contender_of(peer) for peer in peers())]
     load = os.getloadavg()[0]
     rate = bench_flops.flop_rate()
-    rows = [row for drive_off in OFF_STATES for row in measure(entrants, drive_off, repeats)]
+    rows = [row for drive_off in OFF_STATES for row in measure(entrants, papers_shots(drive_off), repeats)]
     return {
         "repeats": repeats,
         "load_before": load,
@@ -86,7 +86,7 @@ def bounds(rows: list[Row], rate: float) -> dict[str, Any]:
     """Operations of a full shot, the time they would take at this machine's rate, and how far from it we are."""
     found: dict[str, Any] = {"rate_flop_s": rate}
     for drive_off in OFF_STATES:
-        counted = bench_flops.operations(drive_off)
+        counted = bench_flops.operations(guns(drive_off))
         bound_us = 1e6 * sum(counted.values()) / rate
         ours = {
             row.family: row.us_per_shot / bound_us

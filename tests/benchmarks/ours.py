@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from analysis.predict.jobs import cores
-from device.parameters import DriveOff, GunParameters
+from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotSummary, compiled_simulator, simulate, simulate_batch
 from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS
-from tests.benchmarks.problem import Outputs, Peer, guns
+from tests.benchmarks.problem import Outputs, Peer, Shots
 
 SINGLE, INTERPRETED, BATCH = "Recoil, one at a time", "Recoil, interpreted", "Recoil, batch"
 _FIXED = ("friction_N", "return_friction_N", "pulse_s", "contact_depth_m", "drive_off", "emf")
@@ -20,7 +20,7 @@ _FIXED = ("friction_N", "return_friction_N", "pulse_s", "contact_depth_m", "driv
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ready:
-    """A prepared way to the shots. `run` does `shots` of them; `found` gives the outputs of the paper's two."""
+    """A prepared way to the shots. `run` does `shots` of them; `found` gives the outputs to be checked."""
 
     run: Callable[[], object]
     shots: float
@@ -35,13 +35,13 @@ class Contender:
     setting: str
     package: str
     models: str
-    prepare: Callable[[DriveOff], Ready]
+    prepare: Callable[[Shots], Ready]
     is_peer: bool = False
 
 
-def one_at_a_time(drive_off: DriveOff) -> Ready:
+def one_at_a_time(shots: Shots) -> Ready:
     """`compiled_simulator`, as a program calls it."""
-    asked, simulate = guns(drive_off), compiled_simulator()
+    asked, simulate = shots.guns, compiled_simulator()
 
     def run() -> list[ShotSummary]:
         return [simulate(gun) for gun in asked]
@@ -58,7 +58,7 @@ def contenders(batch: int, seed: int) -> Iterator[Contender]:
             setting=fidelity,
             package="recoil",
             models="all" if fidelity == "full" else "reduced",
-            prepare=lambda drive_off, fidelity=fidelity: _interpreted(drive_off, fidelity),  # type: ignore[misc]
+            prepare=lambda shots, fidelity=fidelity: _interpreted(shots.guns, fidelity),  # type: ignore[misc]
         )
     for fidelity, used in [*((fidelity, 1) for fidelity in FIDELITIES), ("full", cores())]:
         yield Contender(
@@ -66,15 +66,15 @@ def contenders(batch: int, seed: int) -> Iterator[Contender]:
             setting=f"{fidelity}, {used} core{'s' if used > 1 else ''}",
             package="numba",
             models="all" if fidelity == "full" else "reduced",
-            prepare=lambda drive_off, fidelity=fidelity, used=used: _batch(drive_off, fidelity, used, batch, seed),  # type: ignore[misc]
+            prepare=lambda shots, fidelity=fidelity, used=used: _batch(shots, fidelity, used, batch, seed),  # type: ignore[misc]
         )
 
 
 def contender_of(peer: Peer) -> Contender:
     """A peer as a row."""
 
-    def prepare(drive_off: DriveOff) -> Ready:
-        shoot, asked = peer.build(drive_off), guns(drive_off)
+    def prepare(shots: Shots) -> Ready:
+        shoot, asked = peer.build(shots.drive_off), shots.guns
 
         def run() -> list[Outputs]:
             return [shoot(gun) for gun in asked]
@@ -91,21 +91,19 @@ def contender_of(peer: Peer) -> Contender:
     )
 
 
-def _interpreted(drive_off: DriveOff, fidelity: str) -> Ready:
-    asked = guns(drive_off)
-
+def _interpreted(asked: Sequence[GunParameters], fidelity: str) -> Ready:
     def run() -> list[ShotSummary]:
         return [simulate(gun, fidelity) for gun in asked]
 
     return Ready(run=run, shots=len(asked), found=lambda: [_outputs(shot) for shot in run()])
 
 
-def _batch(drive_off: DriveOff, fidelity: str, used: int, count: int, seed: int) -> Ready:
-    gun = GunParameters(drive_off=drive_off)
+def _batch(shots: Shots, fidelity: str, used: int, count: int, seed: int) -> Ready:
+    gun = GunParameters(drive_off=shots.drive_off)
     arrays = near_guns(np.random.default_rng(seed), count)
 
     def found() -> list[Outputs]:
-        few = simulate_batch(gun, fidelity=fidelity, friction_N=[one.friction_N for one in guns(drive_off)])
+        few = simulate_batch(gun, fidelity=fidelity, friction_N=[one.friction_N for one in shots.guns])
         return list(zip(*(getattr(few, name).tolist() for name in OUTPUTS), strict=True))
 
     return Ready(

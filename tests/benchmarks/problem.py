@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from device.methods import FRICTION_I_N, FRICTION_II_N
 from device.parameters import DriveOff, GunParameters
 from device.physics.scenes import OUTPUTS
+from tests.golden_shots import RANDOM, SHOTS
 
 Outputs = tuple[float, ...]
 """The numbers of `OUTPUTS`, in their order."""
@@ -18,6 +17,15 @@ Shoot = Callable[[GunParameters], Outputs]
 """One shot of a gun; `PeerError` or an error of the package if it gets nowhere."""
 
 OFF_STATES: tuple[DriveOff, ...] = ("open", "shorted")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shots:
+    """Guns with the coil in one off-state, and the outputs of each in fifty digits."""
+
+    drive_off: DriveOff
+    guns: tuple[GunParameters, ...]
+    exact: tuple[Mapping[str, str], ...]
 
 
 class PeerError(RuntimeError):
@@ -40,19 +48,26 @@ def guns(drive_off: DriveOff) -> tuple[GunParameters, ...]:
     return tuple(GunParameters(friction_N=friction, drive_off=drive_off) for friction in (FRICTION_I_N, FRICTION_II_N))
 
 
-def reference_file() -> Path:
-    """Where the fifty digits lie."""
-    return Path(__file__).resolve().parents[1] / "golden" / "physics.json"
-
-
 def reference(drive_off: DriveOff) -> tuple[dict[str, str], ...]:
     """The outputs of `guns(drive_off)` in fifty digits, made by tests/golden/make_physics.py (mpmath)."""
-    shots = json.loads(reference_file().read_text(encoding="utf-8"))["shots"]
-    known = {(shot["friction_N"], shot["drive_off"], shot["emf"]): shot["summary"] for shot in shots}
+    known = {(shot["friction_N"], shot["drive_off"], shot["emf"]): shot["summary"] for shot in SHOTS}
     return tuple(known[gun.friction_N, gun.drive_off, gun.emf] for gun in guns(drive_off))
 
 
-def errors(found: Sequence[Outputs], exact: Sequence[dict[str, str]]) -> dict[str, float]:
+def papers_shots(drive_off: DriveOff) -> Shots:
+    """Those of `guns`, against `reference`."""
+    return Shots(drive_off=drive_off, guns=guns(drive_off), exact=reference(drive_off))
+
+
+def random_shots(drive_off: DriveOff) -> Shots:
+    """Those of the paper's guns, and of 200 random ones that shoot as they do."""
+    papers = papers_shots(drive_off)
+    drawn = tuple(GunParameters(**shot.numbers, drive_off=drive_off) for shot in RANDOM)
+    digits = tuple(getattr(shot, drive_off) for shot in RANDOM)
+    return Shots(drive_off=drive_off, guns=papers.guns + drawn, exact=papers.exact + digits)
+
+
+def errors(found: Sequence[Outputs], exact: Sequence[Mapping[str, str]]) -> dict[str, float]:
     """The largest relative error of each output over the guns. Not a number counts as infinite."""
     return {
         name: max(_error(one[place], float(digits[name])) for one, digits in zip(found, exact, strict=True))

@@ -13,7 +13,7 @@ from typing import Any
 
 from device.parameters import DriveOff
 from tests.benchmarks.ours import Contender, Ready, one_at_a_time
-from tests.benchmarks.problem import errors, reference
+from tests.benchmarks.problem import Shots, errors
 
 _LEAST_S = 0.02  # a measured stretch is at least as long; the clock's grain is far below
 _GIVES_UP = (ArithmeticError, AttributeError, ImportError, LookupError, RuntimeError, TypeError, ValueError)
@@ -55,14 +55,14 @@ class _Runner:
     ratios: list[float] = field(default_factory=list)
 
 
-def measure(contenders: Sequence[Contender], drive_off: DriveOff, repeats: int) -> list[Row]:
-    """A row each, in their order."""
+def measure(contenders: Sequence[Contender], shots: Shots, repeats: int, clock: Ready | None = None) -> list[Row]:
+    """A row each, in their order. `clock` is ours that they are set against; one shot at a time if none is given."""
     rows, runners = [], []
     for contender in contenders:
-        row, runner = _prepared(contender, drive_off)
+        row, runner = _prepared(contender, shots)
         rows.append(row)
         runners += [runner] if runner else []
-    clock = one_at_a_time(drive_off)
+    clock = clock or one_at_a_time(shots)
     calls = _calls(clock)
     for _ in range(repeats):
         for runner in runners:
@@ -74,17 +74,17 @@ def measure(contenders: Sequence[Contender], drive_off: DriveOff, repeats: int) 
     return rows
 
 
-def _prepared(contender: Contender, drive_off: DriveOff) -> tuple[Row, _Runner | None]:
-    row = Row(drive_off=drive_off, family=contender.family, setting=contender.setting, models=contender.models)
+def _prepared(contender: Contender, shots: Shots) -> tuple[Row, _Runner | None]:
+    row = Row(drive_off=shots.drive_off, family=contender.family, setting=contender.setting, models=contender.models)
     if contender.package != "recoil" and find_spec(contender.package) is None:
         row.status, row.note = "not installed", HOW_TO_GET.get(contender.package, OTHERWISE)
         return row, None
     start = time.perf_counter()
     try:
-        ready = contender.prepare(drive_off)
+        ready = contender.prepare(shots)
         found = ready.found()
         row.first_call_s = time.perf_counter() - start
-        row.errors = errors(found, reference(drive_off))
+        row.errors = errors(found, shots.exact)
         row.error = max(row.errors.values())
         if math.isinf(row.error):
             row.status, row.note, row.error, row.errors = "failed", "an output is not a number", None, {}
