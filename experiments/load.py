@@ -21,7 +21,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
 from experiments.design.planned import planned_run, plans_of_groups
 from experiments.design.stimuli import limits, shown_cell, unchanged_methods
-from experiments.record.design_table import columns
+from experiments.record.design_columns import columns
 from experiments.record.tables import MAY_LACK, TABLES, unguard
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw, check_laws
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
-from experiments.record import design_table, replay
+from experiments.record import design_columns, design_table, replay
 from experiments.record.journal import ENDING, Contents, Head, JournalError, read_journal
 from experiments.record.shots_table import SHOTS, shot_rows
 from experiments.record.tables import table_bytes
@@ -33,7 +33,7 @@ def table(contents: Contents) -> bytes:
     """The CSV that a journal makes. `JournalError` as `began_with`."""
     design = began_with(contents.head)
     rows = design_table.design_rows(contents.plan, replay.history(contents), design)
-    return table_bytes(design_table.columns(design), rows)
+    return table_bytes(design_columns.columns(design), rows)
 
 
 def shots_table(contents: Contents) -> bytes | None:

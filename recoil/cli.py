@@ -80,9 +80,13 @@ app.add_typer(predictions.app, name="fit", short_help="Fit a model to a paper's 
 
 def main() -> None:
     """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
-    gc.set_threshold(200_000, 20, 50)  # imports make much and drop little: at 700 a quarter of `check` went into looking
+    gc.set_threshold(
+        200_000, 20, 50
+    )  # imports make much and drop little: at 700 a quarter of `check` went into looking
     forgive_streams()
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else it asks every installed package whether it is one
+    os.environ.setdefault(
+        "PYDANTIC_DISABLE_PLUGINS", "__all__"
+    )  # else it asks every installed package whether it is one
     os.umask(0o077)  # what is written here is about people: for its owner alone
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):  # not every system knows all three

@@ -26,7 +26,7 @@ from experiments.record.replay import RunPosition, replay
 from experiments.record.replay import history as told_by
 from experiments.run import RunRequest, run
 from experiments.runner import Desk, carry_out
-from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session import events
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory, History
@@ -44,6 +44,7 @@ from experiments.session.steps import (
     step_record,
 )
 from experiments.study.folders import place
+from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.laws import SyntheticAnswers
 from experiments.tasks.questions import AnswerValue
 from tests.designs import changed, merged

@@ -22,13 +22,14 @@ from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
 from experiments.run import RunRequest, run
 from experiments.runner import Desk, carry_out
-from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place
+from experiments.synthetic.answers import synthetic_participant_of
 from tests.designs import direction_with
 
 SETUPS = {

@@ -6,7 +6,7 @@ import stat
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.record.design_table import columns
+from experiments.record.design_columns import columns
 from experiments.run import RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 

@@ -13,7 +13,7 @@ from experiments.design.planned import order_shown
 from experiments.design.planning import groups, plan_of, practice_of, square_size
 from experiments.load import load_setup
 from experiments.rebuild import rebuild
-from experiments.record.design_table import columns
+from experiments.record.design_columns import columns
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.run import RunRequest, run

@@ -21,8 +21,7 @@ from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
 from experiments.design.streams import Stream
 from experiments.load import load_setup, shipped_folder
-from experiments.screens.synthetic import synthetic_participant_of
-from experiments.synthetic.answers import GivenAnswer
+from experiments.synthetic.answers import GivenAnswer, synthetic_participant_of
 from experiments.synthetic.diffusion import Lapses, People
 from experiments.synthetic.laws import AppealLaw, DiffusionLaw, RatingsLaw, SyntheticAnswers
 from experiments.synthetic.model_based import rates_by_instruction

@@ -15,8 +15,8 @@ from experiments.design.plan import Plan, Trial
 from experiments.design.planning import plan_of
 from experiments.design.streams import Stream
 from experiments.load import load_setup
-from experiments.screens.synthetic import synthetic_participant_of, synthetic_screen
-from experiments.synthetic.answers import GivenAnswer, draw_ratings
+from experiments.screens.synthetic import synthetic_screen
+from experiments.synthetic.answers import GivenAnswer, draw_ratings, synthetic_participant_of
 from experiments.synthetic.laws import RatesLaw, RatingsLaw, SyntheticAnswers, TableLaw
 from experiments.tasks.questions import on_scale
 from tests.designs import changed

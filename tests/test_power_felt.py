@@ -20,7 +20,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of
 from experiments.design.streams import generator
 from experiments.load import load_setup, shipped_folder
-from experiments.screens.synthetic import synthetic_participant_of
+from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.laws import DiffusionLaw
 from experiments.synthetic.percept import forward_rates

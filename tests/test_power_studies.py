@@ -42,8 +42,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of
 from experiments.design.streams import Stream, generator
 from experiments.load import find, load_setup
-from experiments.screens.synthetic import synthetic_participant_of
-from experiments.synthetic.answers import draw_ratings
+from experiments.synthetic.answers import draw_ratings, synthetic_participant_of
 from experiments.synthetic.laws import RatesLaw
 from experiments.tasks.questions import on_scale as one_on_scale
 from tests.designs import changed

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from experiments.config.door import ConfigError
 from experiments.design.language import QuestionConfig
 from experiments.design.planning import plan_of
-from experiments.record import design_table, tables
+from experiments.record import design_columns, tables
 from experiments.tasks import questions
 from tests.designs import design
 
@@ -116,7 +116,7 @@ def test_the_papers_two_tables_have_their_columns():
         order={"session": ["method"]},
         questions={"response": ways},
     )
-    assert [one.name for one in design_table.columns(config)] == tables.names("direction")[
+    assert [one.name for one in design_columns.columns(config)] == tables.names("direction")[
         :-1
     ]  # instructions: a factor
     scale = {"kind": "rating", "text": "?", "minimum": 0.0, "maximum": 10.0, "grain": 0.1, "when": "block"}
@@ -127,7 +127,7 @@ def test_the_papers_two_tables_have_their_columns():
         trial={"kind": "train"},
         questions={"rating": scale, "comment": {"kind": "text", "text": "?", "when": "block"}},
     )
-    assert [one.name for one in design_table.columns(config)] == tables.names("preference")
+    assert [one.name for one in design_columns.columns(config)] == tables.names("preference")
 
 
 def test_no_two_columns_of_a_table_have_one_name():
@@ -139,7 +139,7 @@ def test_no_two_columns_of_a_table_have_one_name():
             for name in ("q", "r")
         },
     )
-    names = [one.name for one in design_table.columns(config)]
+    names = [one.name for one in design_columns.columns(config)]
     assert len(names) == len(set(names))
     assert {"voltage_V", "voltage_V_1", "voltage_V_2", "q", "correct", "r", "r_correct", "r_time_s"} <= set(names)
 

@@ -14,7 +14,8 @@ from experiments.design.planned import planned_run
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.stimuli import limits
 from experiments.load import load_gun, shipped_folder
-from experiments.record.design_table import columns, design_rows
+from experiments.record.design_columns import columns
+from experiments.record.design_table import design_rows
 from experiments.record.tables import table_bytes
 from experiments.session.steps import Interrupted
 from experiments.tasks.questions import answer_keys, right_answer

@@ -15,10 +15,11 @@ from experiments.load import load_setup
 from experiments.record.journal import Journal, read_journal
 from experiments.run import RunRequest, run
 from experiments.runner import MAX_FAILURES
-from experiments.screens.synthetic import SyntheticScreen, synthetic_participant_of, synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import place
+from experiments.synthetic.answers import synthetic_participant_of
 from tests.designs import changed
 from tests.journals import raw
 from tests.sittings import SETUPS, TroubledGun, resumed_rows, sitting

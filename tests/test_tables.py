@@ -9,7 +9,8 @@ from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
 from experiments.load import load_setup
 from experiments.record import tables
-from experiments.record.design_table import columns, design_rows
+from experiments.record.design_columns import columns
+from experiments.record.design_table import design_rows
 from experiments.record.tables import Row, guard, table_bytes, unguard
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import (

@@ -12,7 +12,7 @@ from experiments.design import stimuli
 from experiments.design.config import DesignConfig
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.load import load_gun
-from experiments.record import design_table
+from experiments.record import design_columns
 from experiments.session.steps import Asking, is_answer
 from experiments.synthetic.answers import SyntheticParticipant
 from experiments.synthetic.laws import SyntheticAnswers, check_laws
@@ -47,7 +47,7 @@ def test_it_fits_its_gun_and_its_people_answer_every_question(name):
     assert design.design == name
     check_laws(design, laws)
     assert all(one.status in {"home", "rendered"} for one in stimuli.limits(design, gun))
-    assert len(design_table.columns(design)) > 8
+    assert len(design_columns.columns(design)) > 8
     for _, plan, person in people(name, 2):
         assert len(plan.trials) == TRIALS[name]
         steps = [step for step, _ in driven(session_of(design, gun, plan)) if isinstance(step, Asking)]

@@ -35,7 +35,7 @@ from analysis.summary.requests import Requests
 from experiments.config.door import checked_table, load, read_text
 from experiments.config.setup import GunConfig
 from experiments.rebuild import began_with, rebuild
-from experiments.record import design_table, journal
+from experiments.record import design_columns, journal
 from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import Contents, JournalError
 from experiments.record.provenance import recoil_version
@@ -271,7 +271,7 @@ def _tables(part: Path, runs: Iterable[_Run]) -> Iterator[tuple[str, str, bytes]
     """Every table by its path in the archive, with a name for its schema, and that."""
     for run in runs:
         design = began_with(run.contents.head)
-        columns = design_table.columns(design)
+        columns = design_columns.columns(design)
         keys = [column.name for column in columns if column.name in ("participant_id", "session", "trial")]
         path = f"{RESULTS}/sub-{run.code}/sub-{run.code}_task-{design.design}_{design.table}.csv"
         yield path, f"task-{design.design}", datapackage.schema(columns, keys)

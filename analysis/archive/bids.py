@@ -21,7 +21,7 @@ from analysis.logs.cell_rules import as_moment
 from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
 from experiments.record import tables
-from experiments.record.design_table import HANDS, columns
+from experiments.record.design_columns import HANDS, columns
 from experiments.record.tables import Column
 from experiments.study.study import Member
 

@@ -20,7 +20,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.rebuild import began_with
 from experiments.record import journal
-from experiments.record.design_table import columns
+from experiments.record.design_columns import columns
 from experiments.record.journal import Head, JournalError
 from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
 from experiments.tasks.questions import correct_columns, is_right

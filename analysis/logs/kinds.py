@@ -17,7 +17,7 @@ from analysis.logs.files import BadLogError, Problem
 from analysis.logs.journals import BegunRun
 from analysis.logs.measures import MEASURES
 from analysis.logs.texts import Block, Cell, Coded
-from experiments.record.design_table import HANDS, columns
+from experiments.record.design_columns import HANDS, columns
 from experiments.record.tables import DataKind, data_kind, is_simulated
 
 OF_KIND: dict[DataKind, str] = {

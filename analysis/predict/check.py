@@ -15,7 +15,6 @@ from experiments.config.door import ConfigError, EligibilityConfig, at_key, part
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import check_methods, find, load_gun, load_setup, load_study
-from experiments.study.folders import freeze_status
 from experiments.study.preregistration import JOURNALS, FreezeStatus, carried_by, numbers_there
 
 EXAMPLE_SEED = 1
@@ -61,6 +60,8 @@ def check(name: str, seed: int | None, participants: int) -> AnyCheck:
     carried = [*carried_by(path.parent.glob(JOURNALS))] if isinstance(found, StudyCheck) else []
     if not carried and not numbers_there(path.parent):
         return found
+    from experiments.study.folders import freeze_status  # noqa: PLC0415 - of use for what was frozen alone
+
     stand = freeze_status(path.parent, carried)
     return replace(found, frozen=stand if isinstance(found, StudyCheck) else stand.of_files(_files(found, path)))
 

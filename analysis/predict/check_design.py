@@ -34,8 +34,8 @@ from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.procedures.config import PairingConfig
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits
-from experiments.screens.synthetic import synthetic_participant_of
 from experiments.study.preregistration import FreezeStatus
+from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 

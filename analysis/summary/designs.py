@@ -42,7 +42,7 @@ def summarise(
     *,
     fits: bool = False,
 ) -> DesignSummary:
-    """The statistics of a design from its table: one row a trial, the columns of `design_table.columns`.
+    """The statistics of a design from its table: one row a trial, the columns of `design_columns.columns`.
 
     Pairs are described, not tested. `gun_labels`: what the gun calls its methods; `fits`: psychometric functions are
     fitted to everybody, however many there are.

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from device.twin import MODEL, SERIAL
 from device.twin.machine import Carried, DriveEvent, StateMachine
 from device.wire import records
 from device.wire.errors import WireError, message
@@ -17,7 +18,7 @@ WATCHDOG_MS: Final = 30_000
 """At boot, for a hand at a terminal; `SerialGun` asks for a shorter one."""
 MIN_WATCHDOG_MS, MAX_WATCHDOG_MS = 100, 60_000
 
-IDENTITY: Final = records.Named(model="haptic-gun", serial="TWIN-1", wire=records.WIRE_VERSION, firmware="1.1.0")
+IDENTITY: Final = records.Named(model=MODEL, serial=SERIAL, wire=records.WIRE_VERSION, firmware="1.1.0")
 
 Said = str | int | None
 """What a command comes to: an answer, an error's number, or nothing to say but that it is done."""

@@ -36,7 +36,7 @@ class ConfigError(RecoilError):
 class Model(BaseModel):
     """A table of a file: unknown keys refused, types as written, no infinities, never changed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
 
 
 def load(model: type[SomeModel], path: Path) -> SomeModel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -207,11 +208,13 @@ class Plan:
     @classmethod
     def from_record(cls, record: object) -> Plan:
         """The plan that a journal's head holds; `pydantic.ValidationError` if it holds none."""
-        return _PLAN.validate_python(record)
+        return _plan_reader().validate_python(record)
 
     def sha256(self) -> str:
         """The hash that names this plan: SHA-256 over its canonical JSON."""
         return sha256(self.record())
 
 
-_PLAN = TypeAdapter(Plan)
+@cache
+def _plan_reader() -> TypeAdapter[Plan]:
+    return TypeAdapter(Plan)

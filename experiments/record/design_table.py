@@ -1,137 +1,23 @@
-"""The log table that a design makes: which columns there are, what each means, whose values it may hold, and its rows.
-
-Pure.
-"""
+"""The rows of the log table that a design makes, from what was done. Pure; its columns are in `design_columns`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
 from experiments.design.config import DesignConfig
-from experiments.design.language import (
-    DIRECTION_FACTOR,
-    EMPTY,
-    METHOD_FACTOR,
-    FactorConfig,
-    QuestionConfig,
-    shown_level,
-)
+from experiments.design.language import EMPTY, QuestionConfig
 from experiments.design.plan import CHOSEN, Plan, Trial, in_interval
 from experiments.record import tables
-from experiments.record.tables import Column, Row, presentation
-from experiments.session.history import History, TrialHistory, by_trial
+from experiments.record.tables import Row
+from experiments.session import remarks
+from experiments.session.history import History, TrialHistory, by_trial, is_attempt
 from experiments.session.remarks import EntryCorrected
-from experiments.session.steps import Answered, Fired, Interrupted, Presented
+from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented
 from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import correct_columns, is_right
 
 ANTICIPATION_S = 0.1
 """A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
-HANDS = ("participant", "experimenter", "synthetic")
-
-
-def columns(design: DesignConfig) -> tuple[Column, ...]:
-    """The columns of a design's table: who and where, factors, questions, and how the trial was presented.
-
-    A factor stands where it is constant: beside the session, beside the set, or beside the trial.
-    """
-    return (*_places(design), *_questions(design), *_presentation(design))
-
-
-def _places(design: DesignConfig) -> Iterator[Column]:
-    yield tables.PARTICIPANT
-    yield tables.level_column("experiment", (design.design,), "which design", required=True)
-    in_session, in_set = (*design.between, *design.order.session), design.order.set
-    if design.table == "trials":
-        yield tables.integer_column("session", "session, from 1, in order of presentation", required=True)
-    yield from _factors(design, in_session)
-    if design.table == "trials":
-        yield tables.integer_column("set", "set within the session, from 1", required=True)
-    yield from _factors(design, in_set)
-    yield tables.integer_column("trial", "trial within the session, from 1, in order of presentation", required=True)
-    if design.adaptive is not None:
-        yield tables.integer_column("track", "adaptive track, from 1; empty of a catch trial")
-    if design.trial.catch:
-        yield tables.flag_column("stimulus", "1 if there was a stimulus, 0 in a catch trial")
-    yield from _factors(design, design.varying)
-
-
-def _factors(design: DesignConfig, names: Iterable[str]) -> Iterator[Column]:
-    for name in names:
-        factor, compared = design.factors[name], name == design.trial.compare
-        chosen = _CHOSEN if name in design.adapted else ""
-        if not (compared and design.trial.kind == "pair"):
-            what = "level that was compared" if compared else _MEANINGS.get(name, "level of this factor")
-            yield _factor(name, factor, what + chosen)
-        if compared:
-            for place in range(1, design.trial.intervals + 1):
-                own = chosen if in_interval(name, place) in design.chosen_names else "; empty if there was no stimulus"
-                yield _factor(in_interval(name, place), factor, f"level in interval {place}{own}")
-
-
-_CHOSEN = ", chosen by the answers before; empty if it was not felt"
-_MEANINGS = {
-    METHOD_FACTOR: "rendering method, as the config names it",
-    DIRECTION_FACTOR: "which way the gun pointed and shot",
-}
-
-
-def _factor(name: str, factor: FactorConfig, description: str) -> Column:
-    if isinstance(factor.all_levels[0], float):
-        return tables.number_column(name, name.rsplit("_", 1)[-1] if "_" in name else "", description)
-    return tables.level_column(name, tuple(map(shown_level, factor.all_levels)), description)
-
-
-def _questions(design: DesignConfig) -> Iterator[Column]:
-    scored = correct_columns(design.questions)
-    for name, question in design.questions.items():
-        yield _answer(name, question)
-        if name in scored:
-            yield tables.flag_column(scored[name], "1 if the answer was right, 0 if not; empty without one")
-        if question.named_answers:
-            yield tables.seconds_column(
-                f"{name}_time_s", "time from the onset of the last stimulus to the answer; empty if there is none"
-            )
-            yield tables.level_column(f"{name}_source", HANDS, "whose hand gave the answer")
-            yield tables.flag_column(
-                f"{name}_time_valid",
-                "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand",
-            )
-        elif question.kind != "text":
-            yield tables.level_column(f"{name}_by", HANDS, "whose hand entered it")
-
-
-def _answer(name: str, question: QuestionConfig) -> Column:
-    match question.kind:
-        case "choice" | "yes-no":
-            return tables.level_column(
-                name, question.named_answers, "what the participant said; empty if never answered"
-            )
-        case "rating":
-            low, high = question.minimum_text or "lower end", question.maximum_text or "upper end"
-            ends = f"{question.minimum:g} ({low}) to {question.maximum:g} ({high})"
-            return tables.bounded_column(name, f"{ends}; empty means none was given", *question.scale)
-        case "number":
-            said = "the number that the participant said; empty means none was given"
-            return tables.bounded_column(name, said, *question.scale)
-        case "ranking":
-            meaning = f"rank among the trials of the block, 1 = {question.minimum_text}; empty means none was given"
-            return tables.integer_column(name, meaning, most=tables.MOST_OFTEN)
-        case "text":
-            return tables.text_column(name, "the participant's own words")
-
-
-def _presentation(design: DesignConfig) -> Iterator[Column]:
-    if design.trial.kind == "train":
-        shots = "shots presented until the participant said next"
-        yield tables.integer_column("shots", shots, least=0, most=tables.MOST_OFTEN)
-        yield tables.seconds_column(
-            "exposure_s", "from the first pulse until the participant said next, at the last presentation"
-        )
-        yield tables.EARLIER_EXPOSURE
-    if design.below_break_away:
-        yield tables.text_column("status", "what the model says of the shot: `home`, `no-break-away` or `rendered`")
-    yield from tables.PRESENTATION
 
 
 def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]:
@@ -224,9 +110,43 @@ def exposure_row(events: TrialHistory) -> Row:
     return row | ({"earlier_exposure_s": round(sum(felt[:-1]), 6)} if felt[:-1] else {})
 
 
+def _presentation(events: TrialHistory, shown: type[Fired | Presented]) -> Row:
+    """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
+    attempts = sum(is_attempt(step, word) for step, word in events.items)
+    notes = "; ".join(remark.text for remark in events.all(remarks.Noted))
+    row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(events)), "note": notes}
+    stimulus = events.last(shown)
+    return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
+
+
+def _flags(events: TrialHistory) -> list[str]:
+    """What went wrong with the stimulus on the way, what was changed afterwards, and the experimenter's own marks."""
+    found = {
+        "device-error": bool(events.all(Failed)),
+        "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
+        "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
+        "repeated": events.repeated,
+        "corrected": any(_is_corrected(events.entered(name)) for name in events.questions),
+        "not-delivered": any(one.mark in remarks.NOT_DELIVERED for one in _last_measured(events)),
+    }
+    own = [remark.flag for remark in events.all(remarks.Flagged)]
+    return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
+
+
+def _last_measured(events: TrialHistory) -> list[remarks.ShotMeasured]:
+    """What a sensor measured of the last presentation."""
+    found = events.all(remarks.ShotMeasured)
+    return [one for one in found if one.attempt == found[-1].attempt]
+
+
+def _is_corrected(entered: list[Answered | EntryCorrected]) -> bool:
+    """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
+    return bool(entered) and isinstance(entered[-1], EntryCorrected)
+
+
 def _shown(design: DesignConfig, events: TrialHistory) -> Row:
     """How the trial was presented. A first answer that came sooner than anybody reacts is marked."""
-    row = presentation(events, Presented if design.trial.kind == "train" else Fired)
+    row = _presentation(events, Presented if design.trial.kind == "train" else Fired)
     if (fired := events.last(Fired)) is not None:
         row |= {"status": fired.motion}
     if events.at_edge:

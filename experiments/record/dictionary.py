@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from experiments.design.config import DesignConfig
-from experiments.record import design_table
+from experiments.record.design_columns import columns
 from experiments.record.shots_table import SHOTS
 from experiments.record.tables import FILE_SUFFIX, TABLES, Column
 
@@ -26,7 +26,7 @@ def dictionary() -> str:
 def design_dictionary(design: DesignConfig) -> str:
     """The columns of a design's table as Markdown, to lie beside its logs."""
     head = f"# {design.title}\n\nOne row a planned trial, also those not reached. Empty means missing; 0 is a value.\n"
-    return "\n".join([head, *_table(f"sub-<ID>_task-{design.design}_{design.table}.csv", design_table.columns(design))])
+    return "\n".join([head, *_table(f"sub-<ID>_task-{design.design}_{design.table}.csv", columns(design))])
 
 
 def _table(name: str, columns: Iterable[Column]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Literal, Self, TypeVar, get_args
 
@@ -403,16 +404,22 @@ def head_of(path: Path, data: bytes) -> Head | None:
         if sha256(value[part]) != value.get(f"{part}_sha256"):
             raise JournalError(f"{path}: line 1: {part} does not have the hash {part}_sha256; it was changed")
     of_head = {"path": path, "plan_json": value["plan"], "setup_json": value["setup"], "laws_json": value.get("laws")}
-    return read_as(_HEAD, value | of_head, f"{path}: line 1")
+    found: Head = read_as(_reader(Head), value | of_head, f"{path}: line 1")
+    return found
 
 
 def record_of(path: Path, number: int, line: bytes, before: str) -> Record:
     """The record on a line after the first; it follows from the line before. `JournalError` if it does not."""
-    return read_as(_RECORD, _values(path, number, line, before), f"{path}: line {number + 1}")
+    found: Record = read_as(_reader(Record), _values(path, number, line, before), f"{path}: line {number + 1}")
+    return found
 
 
-_HEAD, _RECORD = TypeAdapter(Head), TypeAdapter(Record)
 Typed = TypeVar("Typed")
+
+
+@cache
+def _reader(kind: type[Typed]) -> TypeAdapter[Typed]:
+    return TypeAdapter(kind)
 
 
 def read_as(kind: TypeAdapter[Typed], value: object, place: str) -> Typed:

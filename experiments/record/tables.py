@@ -12,10 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from device.twin.core import IDENTITY
-from experiments.session import remarks
-from experiments.session.history import TrialHistory, is_attempt
-from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented
+from device import twin
 
 ColumnType = Literal["text", "level", "integer", "number", "flag"]
 
@@ -108,7 +105,7 @@ GUN = text_column("gun", "who rendered it: model and serial number of the gun, `
 
 DataKind = Literal["real", "simulated gun", "synthetic"]
 """Whose data: of people at a gun, of people at a gun that is only simulated, or of synthetic participants."""
-_SIMULATED_GUNS = frozenset(["simulated", f"{IDENTITY.model}:{IDENTITY.serial}"])
+_SIMULATED_GUNS = frozenset(["simulated", f"{twin.MODEL}:{twin.SERIAL}"])
 """As they stand in the column `gun`: the simulated gun, and its twin on a line."""
 
 
@@ -217,40 +214,6 @@ def unguard(cell: str) -> str:
 
 
 Row = dict[str, object]
-
-
-def presentation(events: TrialHistory, shown: type[Fired | Presented]) -> Row:
-    """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
-    attempts = sum(is_attempt(step, word) for step, word in events.items)
-    notes = "; ".join(remark.text for remark in events.all(remarks.Noted))
-    row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(events)), "note": notes}
-    stimulus = events.last(shown)
-    return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
-
-
-def _flags(events: TrialHistory) -> list[str]:
-    """What went wrong with the stimulus on the way, what was changed afterwards, and the experimenter's own marks."""
-    found = {
-        "device-error": bool(events.all(Failed)),
-        "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
-        "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
-        "repeated": events.repeated,
-        "corrected": any(_is_corrected(events.entered(name)) for name in events.questions),
-        "not-delivered": any(one.mark in remarks.NOT_DELIVERED for one in _last_measured(events)),
-    }
-    own = [remark.flag for remark in events.all(remarks.Flagged)]
-    return list(dict.fromkeys([flag for flag, there in found.items() if there] + own))
-
-
-def _last_measured(events: TrialHistory) -> list[remarks.ShotMeasured]:
-    """What a sensor measured of the last presentation."""
-    found = events.all(remarks.ShotMeasured)
-    return [one for one in found if one.attempt == found[-1].attempt]
-
-
-def _is_corrected(entered: list[Answered | remarks.EntryCorrected]) -> bool:
-    """Whether what counts is a correction: what was entered anew, because its trial was presented again, is none."""
-    return bool(entered) and isinstance(entered[-1], remarks.EntryCorrected)
 
 
 def table_bytes(table: tuple[Column, ...], rows: Iterable[Row]) -> bytes:

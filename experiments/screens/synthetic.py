@@ -6,7 +6,6 @@ from typing import Any
 
 from device import GunStatus
 from experiments.clock import Clock
-from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan
@@ -18,21 +17,7 @@ from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Present, Rate, Rest, Step
-from experiments.synthetic.answers import SyntheticParticipant
-from experiments.synthetic.laws import SyntheticAnswers
-
-
-def synthetic_participant_of(setup: Setup[DesignConfig], plan: Plan) -> SyntheticParticipant:
-    """The synthetic participant that a setup asks for, the same in data mode and in visual mode.
-
-    `ConfigError` if there is none, if a table does not fit, or if the numbers make nobody.
-    """
-    if not isinstance(setup.laws, SyntheticAnswers):
-        raise ConfigError(f"{setup.source}: synthetic is missing; it names the file that says how people answer")
-    try:
-        return SyntheticParticipant(setup.config, setup.laws, plan, setup.gun)
-    except ConfigError as error:
-        raise ConfigError(f"{setup.source.parent / (setup.config.synthetic or '')}: {error}") from error
+from experiments.synthetic.answers import synthetic_participant_of
 
 
 def synthetic_screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> SyntheticScreen:

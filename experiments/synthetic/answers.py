@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from experiments.config.door import ConfigError
-from experiments.config.setup import GunConfig
+from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import EMPTY, NO, YES, Level, NumberScale, QuestionConfig, shown_level
 from experiments.design.plan import Condition, Plan, Trial
@@ -255,6 +255,19 @@ class SyntheticParticipant:
             raise ConfigError(f"questions.{name}.worth has no value for {shown}; give one for each level")
         own = Stream(self._plan.seed, "worth", *self._who, name, shown).normal()
         return law.worth[shown] * math.exp(law.log_worth_sd * own)
+
+
+def synthetic_participant_of(setup: Setup[DesignConfig], plan: Plan) -> SyntheticParticipant:
+    """The synthetic participant that a setup asks for, the same in data mode and in visual mode.
+
+    `ConfigError` if there is none, if a table does not fit, or if the numbers make nobody.
+    """
+    if not isinstance(setup.laws, SyntheticAnswers):
+        raise ConfigError(f"{setup.source}: synthetic is missing; it names the file that says how people answer")
+    try:
+        return SyntheticParticipant(setup.config, setup.laws, plan, setup.gun)
+    except ConfigError as error:
+        raise ConfigError(f"{setup.source.parent / (setup.config.synthetic or '')}: {error}") from error
 
 
 def _log_ratio(a: float, b: float) -> float:

@@ -24,7 +24,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import ArrayLike
 from pydantic import Field
 
@@ -197,6 +196,8 @@ def _nodes(sd: float) -> tuple[Floats, Floats]:
     """Places and weights of the quadrature."""
     if sd == 0.0:
         return np.zeros(1), np.ones(1)
+    from numpy.polynomial.hermite_e import hermegauss  # noqa: PLC0415 - not for who only reads a design
+
     places, weights = hermegauss(_POINTS)
     return sd * places, weights / math.sqrt(2.0 * math.pi)
 

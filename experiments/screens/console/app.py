@@ -33,13 +33,13 @@ from experiments.screens.console.windows import (
     open_as_left,
     signals_to,
 )
-from experiments.screens.synthetic import synthetic_participant_of
 from experiments.session import events
 from experiments.session.events import Hand
 from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import PlaceError
+from experiments.synthetic.answers import synthetic_participant_of
 from experiments.tasks.questions import first_choices
 
 GUN_LOOK_S = 0.2
