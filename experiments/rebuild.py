@@ -42,6 +42,11 @@ def shots_table(contents: Contents) -> bytes | None:
     return table_bytes(SHOTS, rows) if rows else None
 
 
+def shots_path(journal: Path) -> Path:
+    """Where the table of what a sensor measured lies, beside its journal."""
+    return journal.with_name(journal.name.replace(ENDING, "_shots.csv"))
+
+
 def misnamed(path: Path, plan: Plan) -> str:
     """Whose a journal is that lies under another run's name; empty if it is where it belongs, or says no name."""
     name = JOURNAL_NAME.search(path.name)

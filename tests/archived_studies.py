@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,8 @@ def _run(folder: Path, experiment: str, code: str, *, practice: bool = False) ->
     asked = RunRequest(
         setup=setup, participant_id=code, results=folder / "results", practice=practice, seed=int(code[1:])
     )
+    if (experiment, code) == ("preference", "P03"):
+        asked = replace(asked, sensor="simulated")
     run(asked, synthetic_screen, VirtualClock())
 
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,9 @@ from device.methods import Method, paper_methods
 from device.parameters import GunParameters
 from device.physics.hand import HandMechanics
 from device.sensor.expected import FINE_S, expected_shot, modelled_acceleration
-from device.sensor.measuring import BEFORE_S, DeliveredShot, SensorTrace, measured
-from experiments.delivered.marks import FRICTION_SPREAD, PEAK_SPREAD, DeliveryLevel, after_shot
+from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
+from experiments.delivered.marks import MethodLevels, ShotParts, judged
+from experiments.delivered.recorder import parts_of
 
 RATE_HZ = 3200.0
 NOISE_M_S2 = 0.1
@@ -24,6 +25,8 @@ LONG_S = 0.15
 FINE = np.arange(-BEFORE_S, LONG_S, FINE_S)
 DAMPED = paper_methods()["asymmetric-2"]
 """The paper's method with a damper."""
+LIGHT = paper_methods()["asymmetric-1"]
+"""The one without, whose friction scatters by 5 % a shot."""
 
 
 def slipped(actuator: Method, part: float) -> Method:
@@ -44,39 +47,34 @@ def seen(of: np.ndarray, random: np.random.Generator, noise: float = NOISE_M_S2)
     return SensorTrace(time_s=times, acceleration_m_s2=values)
 
 
-def measured_shot(of: np.ndarray, random: np.random.Generator, noise: float = NOISE_M_S2) -> DeliveredShot:
+def measured_shot(
+    of: np.ndarray, random: np.random.Generator, noise: float = NOISE_M_S2, actuator: Method = DAMPED
+) -> DeliveredShot:
     """What is measured of a course; there must be something."""
-    expected = expected_shot(DAMPED, RATE_HZ)
-    assert expected is not None
-    found = measured(seen(of, random, noise), 0.0, expected)
+    found = measured(seen(of, random, noise), 0.0, expected_of(actuator))
     assert found is not None
     return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parts:
-    """What one shot came to, as parts of what is expected, with their uncertainties."""
-
-    peak: tuple[float, float]
-    friction: tuple[float, float]
+def measured_parts(random: np.random.Generator, actuator: Method, courses: Sequence[np.ndarray]) -> list[ShotParts]:
+    """Shots with these courses, as parts of what is expected."""
+    expected = expected_of(actuator)
+    return [parts_of(measured_shot(one, random, actuator=actuator), expected) for one in courses]
 
 
-def parts_of(found: DeliveredShot) -> Parts:
-    expected = expected_shot(DAMPED, RATE_HZ)
+def expected_of(actuator: Method) -> ExpectedShot:
+    """What is expected of a method's shot at the sensor's rate."""
+    expected = expected_shot(actuator, RATE_HZ)
     assert expected is not None
-    assert expected.friction_N is not None
-    friction = (found.friction_N or np.nan) / expected.friction_N, (found.friction_u_N or 0.0) / expected.friction_N
-    peak = found.peak_m_s2 / expected.peak_m_s2, found.peak_u_m_s2 / expected.peak_m_s2
-    return Parts(peak=peak, friction=friction)
+    return expected
 
 
-def marks_of(shots: Sequence[Parts]) -> list[str]:
-    """The mark of each shot of a run, by peak and friction together; empty for none."""
-    peak, friction, found = DeliveryLevel.before(PEAK_SPREAD), DeliveryLevel.before(FRICTION_SPREAD), []
+def marks_of(shots: Sequence[ShotParts]) -> list[str]:
+    """The mark of each shot of a run of one method; empty for none."""
+    levels, found = MethodLevels(), list[str]()
     for one in shots:
-        peak, of_peak = after_shot(peak, *one.peak)
-        friction, of_friction = after_shot(friction, *one.friction)
-        found.append(of_peak or of_friction)
+        levels, judgement = judged(levels, one)
+        found.append(judgement.mark)
     return found
 
 

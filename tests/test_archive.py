@@ -71,7 +71,9 @@ def test_an_archive_is_whole_and_its_journals_make_its_tables_and_statistics(
     assert (found.faults, found.remarks) == ((), ())
     assert found.manifest_sha256 == done.manifest_sha256
     assert found.files == done.files == len(tree(archive)) - 1
-    assert found.rebuilt == len([path for path in tree(archive) if re.search(r"\.csv$|beh\.tsv$", path)]) - 1 + 2
+    assert (
+        found.rebuilt == len([path for path in tree(archive) if re.search(r"\.csv$|(beh|events)\.tsv$", path)]) - 1 + 2
+    )
 
 
 def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path, Path, Archived]) -> None:
@@ -102,11 +104,22 @@ def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path
     assert "Runs in the archive, and left out" in (archive / "analysis" / "report.md").read_text()
     assert {path.parts[0] for path in (Path(one) for one in tree(archive / "results"))} == {
         *("sub-P01", "sub-P02", "sub-P03", "participants.jsonl"),
-        *("task-direction_columns.md", "task-preference_columns.md"),
+        *("task-direction_columns.md", "task-preference_columns.md", "shots_columns.md"),
     }
     said = " ".join((*done.left_out, *done.remarks))
     for words in ("P05 is excluded", "P04 has begun direction", "sub-P04_task-preference_ratings.csv"):
         assert words in said
+
+
+def test_what_a_sensor_measured_is_in_it_without_the_place_of_the_sensor(made: tuple[Path, Path, Archived]) -> None:
+    study, archive, _ = made
+    name = "results/sub-P03/sub-P03_task-preference_shots.csv"
+    ours, theirs = rows(archive / name), rows(study / name)
+    assert [row["delivered_peak_m_s2"] for row in ours] == [row["delivered_peak_m_s2"] for row in theirs]
+    assert {row["sensor"] for row in ours} == {"[redacted]"}
+    resources = json.loads((archive / "datapackage.json").read_text())["resources"]
+    assert {one["schema"] for one in resources if one["path"] == name} == {"schemas/shots.json"}
+    assert (archive / "bids" / "sub-P03" / "beh" / "sub-P03_task-preference_events.tsv").is_file()
 
 
 def test_the_statistics_are_those_of_the_study(made: tuple[Path, Path, Archived], tmp_path: Path) -> None:

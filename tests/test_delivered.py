@@ -26,7 +26,6 @@ from device.sensor.streams import SensorError
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.delivered import recorder
-from experiments.delivered.marks import FRICTION_SPREAD, PEAK_SPREAD, SUM_LIMIT, Z_LIMIT, DeliveryLevel, after_shot
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
@@ -35,7 +34,7 @@ from experiments.run import Finished, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.watch.runs import RunSoFar
 from tests.at_controls import short_direction
-from tests.delivered_chain import DAMPED, RATE_HZ, course, marks_of, measured_shot, parts_of, slipped
+from tests.delivered_chain import DAMPED, RATE_HZ, course, measured_shot
 
 MASS_KG = 0.2262
 
@@ -112,45 +111,6 @@ def test_rest_is_no_shot_and_too_few_samples_are_refused():
     assert measured(rest, 0.0, expected) is None
     with pytest.raises(ValueError, match=r"at least 10 are needed to know the noise by"):
         measured(rest, -0.05, expected)
-
-
-# the marks
-
-
-def test_without_a_change_the_ratio_of_likelihoods_is_1_on_average():
-    """Which the bound of false marks rests on: by Gauss and Hermite, for small and large changes."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(80)
-    for change in (0.3, 1.0, 4.6):
-        ratio = float(weights @ np.exp(change * nodes - change**2 / 2)) / math.sqrt(2 * math.pi)
-        assert ratio == pytest.approx(1.0, rel=1e-9)
-    assert 4 * math.exp(-SUM_LIMIT) + 4 * 0.5 * math.erfc(Z_LIMIT / math.sqrt(2)) <= 1e-4 + 1e-12
-
-
-def test_a_damper_that_slips_is_seen_within_three_shots_and_a_good_one_is_not_marked():
-    random, good, bad = np.random.default_rng(6), course(DAMPED), course(slipped(DAMPED, 0.1))
-    for _ in range(8):
-        shots = [parts_of(measured_shot(of, random)) for of in [good] * 12 + [bad] * 3]
-        marks = marks_of(shots)
-        assert marks[:12] == [""] * 12
-        assert any(marks[12:])
-
-
-def test_one_shot_far_off_is_marked_at_once_and_teaches_nothing():
-    level = DeliveryLevel.before(PEAK_SPREAD)
-    for _ in range(5):
-        level, mark = after_shot(level, 1.03, 0.01)
-        assert mark == ""
-    after, mark = after_shot(level, 0.5, 0.01)
-    assert mark != ""
-    assert (after.mean, after.variance) == (level.mean, level.variance)
-
-
-def test_a_run_has_its_own_level():
-    level = DeliveryLevel.before(FRICTION_SPREAD)
-    for _ in range(20):
-        level, mark = after_shot(level, 1.12, 0.01)
-        assert mark == ""
-    assert level.mean == pytest.approx(1.12, abs=0.002)
 
 
 # beside a run

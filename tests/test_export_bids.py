@@ -74,7 +74,9 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("direction", "preference"):
         setup = load_setup(str(shipped_folder() / f"{name}.toml"))
         for code in ("P01", "P02"):
-            run(RunRequest(setup=setup, participant_id=code, results=results), synthetic_screen, VirtualClock())
+            sensor = "simulated" if (name, code) == ("direction", "P01") else ""
+            request = RunRequest(setup=setup, participant_id=code, results=results, sensor=sensor)
+            run(request, synthetic_screen, VirtualClock())
     trials = [row | {"response_source": "participant", "flags": "late"} for row in trial_rows("Z9")]
     trials[0] |= {"response": "", "correct": "", "response_time_s": "", "response_source": "", "attempts": ""}
     trials[1] |= {"note": NASTY, "onset_utc": "2026-03-01T09:30:00.250000Z"}
@@ -150,6 +152,18 @@ def test_the_tables_hold_what_the_logs_hold(exported: Path, real: Path) -> None:
             assert found[lacking].isna().all(axis=None)
             found = found.drop(columns=lacking)
             pd.testing.assert_frame_equal(found, expected[list(found)], check_dtype=False)
+
+
+def test_what_a_sensor_measured_is_one_event_a_shot(exported: Path, real: Path) -> None:
+    (path,) = exported.rglob("*_events.tsv")
+    found = table(exported, f"sub-P01/beh/{path.name}")
+    trials = table(exported, "sub-P01/beh/sub-P01_task-direction_beh.tsv")
+    assert [row["onset"] for row in found] == [row["onset"] for row in trials]
+    with (real / "sub-P01" / "sub-P01_task-direction_shots.csv").open(encoding="utf-8", newline="") as stream:
+        shots = list(csv.DictReader(stream))
+    peaks = [float(row["delivered_peak_m_s2"]) for row in shots]
+    assert [float(row["delivered_peak_m_s2"]) for row in found] == peaks
+    assert "sensor" not in found[0]  # it may name a folder of somebody's
 
 
 def test_missing_is_na_and_zero_is_a_value(exported: Path) -> None:

@@ -34,11 +34,12 @@ from analysis.summary.analyze import analyze
 from analysis.summary.requests import Requests
 from experiments.config.door import checked_table, load, read_text
 from experiments.config.setup import GunConfig
-from experiments.rebuild import began_with, rebuild
+from experiments.rebuild import began_with, rebuild, shots_path, shots_table
 from experiments.record import design_columns, journal
-from experiments.record.dictionary import design_dictionary
+from experiments.record.dictionary import design_dictionary, shots_dictionary
 from experiments.record.journal import Contents, JournalError
 from experiments.record.provenance import recoil_version
+from experiments.record.shots_table import SHOTS
 from experiments.record.tables import DataKind
 from experiments.study.folders import PlaceError
 from experiments.study.register import REGISTER_FILE
@@ -193,6 +194,10 @@ def _write_results(part: Path, runs: Sequence[_Run], members: Mapping[str, Membe
         placing.write_file(part, place, redaction.redacted(run.path, run.data, first[code], free_text=free_text))
         table, data, made = rebuild(part / place)
         placing.write_file(table.parent, table.name, data)
+        shots = shots_table(made)
+        if shots is not None:
+            placing.write_file(table.parent, shots_path(part / place).name, shots)
+            placing.write_file(part, f"{RESULTS}/shots_columns.md", shots_dictionary().encode())
         design = began_with(made.head)
         placing.write_file(part, f"{RESULTS}/task-{design.design}_columns.md", design_dictionary(design).encode())
     facts = redaction.redacted_register(members[code] for code in first if code in members)
@@ -275,6 +280,9 @@ def _tables(part: Path, runs: Iterable[_Run]) -> Iterator[tuple[str, str, bytes]
         keys = [column.name for column in columns if column.name in ("participant_id", "session", "trial")]
         path = f"{RESULTS}/sub-{run.code}/sub-{run.code}_task-{design.design}_{design.table}.csv"
         yield path, f"task-{design.design}", datapackage.schema(columns, keys)
+        shots = f"{RESULTS}/sub-{run.code}/sub-{run.code}_task-{design.design}_shots.csv"
+        if (part / shots).is_file():
+            yield shots, "shots", datapackage.schema(SHOTS)
     for file in sorted((part / ANALYSIS).rglob("*.csv")):
         path = file.relative_to(part).as_posix()
         yield path, path.removesuffix(".csv"), datapackage.schema_of_results(file.read_bytes())

@@ -12,8 +12,9 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TypedDict
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import TypedDict, cast
 
 import pandas as pd
 
@@ -22,7 +23,8 @@ from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
 from experiments.record import tables
 from experiments.record.design_columns import HANDS, columns
-from experiments.record.tables import Column
+from experiments.record.shots_table import SHOTS
+from experiments.record.tables import Column, Row
 from experiments.study.study import Member
 
 TASKS = {
@@ -67,6 +69,22 @@ _MORE: dict[str, ColumnDescription] = {
     },
 }
 """What the data dictionary does not say, or says of what stands in the log and not here."""
+
+_EVENT_COLUMNS: dict[str, ColumnDescription] = {
+    "onset": {
+        "LongName": "Onset",
+        "Description": "pulse of the shot, counted as the onsets of this run's trials are; n/a where not known",
+        "Format": "number",
+        "Units": "s",
+    },
+    "duration": {
+        "LongName": "Duration",
+        "Description": "of the shot; n/a, as no sensor measures it",
+        "Format": "number",
+        "Units": "s",
+    },
+}
+"""The columns that BIDS wants first in a table of events."""
 
 _CLEANED = "line breaks and tabs are blanks, double quotes single ones; a leading = + - @ or ' has a ' in front"
 
@@ -127,6 +145,7 @@ that describe every column.
 - Participants who were excluded, practice runs and logs that break a rule are not in it.
 - For privacy there are no dates (`onset` counts from the first pulse of the run), and ages above 89 are given as 89.
 - {text}
+- Where a sensor on the gun measured the shots, `..._events.tsv` has one row a shot.
 - Where `gun` says `simulated`, a simulated gun rendered the shots.
 
 Please add what a program cannot know to `dataset_description.json`: Authors, License, Funding, EthicsApprovals. Keys
@@ -178,15 +197,15 @@ NOT_AVAILABLE = "n/a"
 OLDEST_AGE = 89
 """Ages above are given as this one: people so old are so few that their age might tell who they are."""
 
-_NO_FREE_TEXT = ("participant_id", "flags", "onset_utc", "gun", "status")
+_NO_FREE_TEXT = ("participant_id", "flags", "onset_utc", "gun", "status", "method", "because")
 _IN_THE_NAME = ("participant_id", "experiment")
 _NAMES = {"response_time_s": "response_time", "onset_utc": "onset"}
 """Columns that BIDS has a name for, and what it means by it."""
 _SEX = {"female": "female", "male": "male", "other": "other"}
 _HANDEDNESS = {"right": "right", "left": "left", "both": "ambidextrous"}
 _OURS = re.compile(
-    r"README|participants\.(tsv|json)|dataset_description\.json|task-[a-z]+_beh\.json"
-    r"|sub-([A-Za-z0-9]+)(/beh(/sub-\2_task-[a-z]+_beh\.tsv)?)?"
+    r"README|participants\.(tsv|json)|dataset_description\.json|task-[a-z]+_(?:beh|events)\.json"
+    r"|sub-([A-Za-z0-9]+)(/beh(/sub-\2_task-[a-z]+_(?:beh|events)\.tsv)?)?"
 )
 
 
@@ -201,6 +220,8 @@ class Run:
     task: str
     between: tuple[str, ...] = ()
     """The columns that vary between participants alone."""
+    shots: tuple[Row, ...] = ()
+    """What a sensor measured of each shot, where there was one."""
 
     @property
     def group(self) -> str:
@@ -247,8 +268,11 @@ def is_ours(path: str) -> bool:
     return bool(_OURS.fullmatch(path))
 
 
-def runs_of(*logs: Logs) -> Runs:
-    """The runs in the logs. A code that differs from another in case alone would share its folder: it is left out."""
+def runs_of(*logs: Logs, shots: Mapping[tuple[str, str], tuple[Row, ...]] | None = None) -> Runs:
+    """The runs in the logs, with what a sensor measured by participant and experiment.
+
+    A code that differs from another in case alone would share its folder: it is left out.
+    """
     runs, problems, known = [], list[str](), dict[str, str]()
     for run in (run for part in logs for run in _all_runs(part)):
         first = known.setdefault(run.participant_id.casefold(), run.participant_id)
@@ -256,7 +280,7 @@ def runs_of(*logs: Logs) -> Runs:
             rule = f"differs from {first!r} in case alone (rule: one code a participant)"
             problems.append(f"participant {run.participant_id!r}, {run.experiment}: {rule}")
             continue
-        runs.append(run)
+        runs.append(replace(run, shots=(shots or {}).get((run.participant_id, run.experiment), ())))
     return Runs(runs=tuple(runs), problems=tuple(problems))
 
 
@@ -295,6 +319,7 @@ def data_set(
         "participants.json": json_bytes({name: PARTICIPANT_COLUMNS[name] for name in shown}),
         **{f"task-{task}_beh.json": json_bytes(_sidecar(run, free_text)) for task, run in runs.tasks.items()},
         **{_path(run): _beh(run, free_text) for run in runs.runs},
+        **_events(runs, version, free_text),
     }
 
 
@@ -324,8 +349,45 @@ def _participant(code: str, done: Sequence[Run], member: Member | None) -> dict[
     }
 
 
-def _path(run: Run) -> str:
-    return f"sub-{run.participant_id}/beh/sub-{run.participant_id}_task-{run.experiment}_beh.tsv"
+def _path(run: Run, suffix: str = "beh") -> str:
+    return f"sub-{run.participant_id}/beh/sub-{run.participant_id}_task-{run.experiment}_{suffix}.tsv"
+
+
+def _events(runs: Runs, version: str, free_text: bool) -> dict[str, bytes]:
+    """What a sensor measured, one event a shot, of the runs that had one."""
+    measured = [run for run in runs.runs if run.shots]
+    shown = [
+        column
+        for column in SHOTS
+        if column.name not in (*_IN_THE_NAME, "onset_utc") and (free_text or not _is_free_text(column))
+    ]
+    columns = _EVENT_COLUMNS | {column.name: described(column, column.name) for column in shown}
+    made_by = {"StimulusPresentation": {"SoftwareName": GENERATOR, "SoftwareVersion": version}}
+    return {
+        **{f"task-{run.experiment}_events.json": json_bytes(_task(run) | made_by | columns) for run in measured},
+        **{_path(run, "events"): _event_table(run, shown) for run in measured},
+    }
+
+
+def _event_table(run: Run, shown: Sequence[Column]) -> bytes:
+    start, set_back = _first_pulse(run)
+    onsets = (as_moment(str(shot["onset_utc"] or "")) for shot in run.shots)
+    cells = (
+        [
+            repr((onset - start).total_seconds()) if onset and start and not set_back else NOT_AVAILABLE,
+            NOT_AVAILABLE,
+            *(_cell(column, cast("Cell", shot[column.name])) for column in shown),
+        ]
+        for shot, onset in zip(run.shots, onsets, strict=True)
+    )
+    return _tsv([*_EVENT_COLUMNS, *(column.name for column in shown)], cells)
+
+
+def _first_pulse(run: Run) -> tuple[datetime | None, bool]:
+    """The earliest pulse in a run's rows, and whether its clock was set back."""
+    back = any(tables.CLOCK_SET_BACK in str(row["flags"] or "").split() for row in run.rows)
+    moments = (as_moment(str(row["onset_utc"] or "")) for row in run.rows)
+    return min(filter(None, moments), default=None), back
 
 
 def _exported(run: Run, free_text: bool) -> list[Column]:
@@ -344,7 +406,11 @@ def _name(column: Column) -> str:
 
 def _sidecar(run: Run, free_text: bool) -> dict[str, object]:
     found = {_name(column): described(column, _name(column)) for column in _exported(run, free_text)}
-    return {"TaskName": run.experiment, "TaskDescription": run.task, **found}
+    return {**_task(run), **found}
+
+
+def _task(run: Run) -> dict[str, object]:
+    return {"TaskName": run.experiment, "TaskDescription": run.task}
 
 
 def _beh(run: Run, free_text: bool) -> bytes:

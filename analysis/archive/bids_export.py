@@ -10,10 +10,15 @@ from pathlib import Path
 
 from analysis.archive import bids, placing
 from analysis.logs.column_map import ColumnMap
+from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from experiments.config.door import load
 from experiments.load import load_study
+from experiments.record.journal import read_journal
 from experiments.record.provenance import recoil_version
+from experiments.record.replay import history
+from experiments.record.shots_table import shot_rows
+from experiments.record.tables import Row
 from experiments.study import register
 from experiments.study.folders import PlaceError
 from experiments.study.register import RegisterError
@@ -86,8 +91,24 @@ def data_set_of(
     logs: Logs, members: Mapping[str, Member], name: str, *, free_text: bool = False
 ) -> tuple[bids.Runs, dict[str, bytes]]:
     """The runs in logs, of every kind of data that they hold, and the files of the data set that they make."""
-    runs = bids.runs_of(logs, *logs.apart)
+    runs = bids.runs_of(logs, *logs.apart, shots=measured_shots(logs))
     return runs, bids.data_set(runs, members, name, recoil_version(), free_text=free_text)
+
+
+def measured_shots(logs: Logs) -> dict[tuple[str, str], tuple[Row, ...]]:
+    """What a sensor measured, by participant and experiment, from the journals beside the logs."""
+    found = dict[tuple[str, str], tuple[Row, ...]]()
+    for file in (file for part in (logs, *logs.apart) for file in part.files):
+        path = Path(journal_of(str(file)))
+        if not path.is_file() or _MEASURED not in path.read_bytes():
+            continue
+        contents = read_journal(path)
+        plan = contents.plan
+        found[plan.participant_id, plan.experiment] = tuple(shot_rows(plan, history(contents)))
+    return found
+
+
+_MEASURED = b'"kind":"measured"'
 
 
 def _earlier(target: Path) -> Path | None:

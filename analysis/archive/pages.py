@@ -35,7 +35,7 @@ Recoil, `sha256sum --check {manifest}` checks the files.
 
 | file | holds |
 | --- | --- |
-| `results/` | each run's journal, redacted, and the table that it makes; what the columns mean |
+| `results/` | each run's journal, redacted, and the tables that it makes; what the columns mean |
 | `analysis/` | statistics, tables of results, figures and report |
 | `bids/` | the same runs as a BIDS data set |
 | `datapackage.json`, `schemas/` | every table as a Frictionless data package, with types, ranges and meanings |

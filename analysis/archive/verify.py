@@ -23,7 +23,7 @@ from analysis.report.serial import as_json
 from analysis.summary.analyze import result_files
 from analysis.summary.sections.sections import STATISTICS
 from device.words import RecoilError
-from experiments.rebuild import rebuild
+from experiments.rebuild import rebuild, shots_path, shots_table
 from experiments.record import journal
 from experiments.study.folders import PlaceError
 from experiments.study.register import REGISTER_FILE
@@ -109,9 +109,12 @@ def _made_again(folder: Path, place: Path, listed: Mapping[str, str], track: Tra
         if _is_source(path):
             placing.write_file(place, path, (folder / path).read_bytes())
             if path.endswith(journal.ENDING):
-                table, data, _ = rebuild(place / path)
-                placing.write_file(table.parent, table.name, data)
-                yield _Made(path=table.relative_to(place).as_posix(), data=data)
+                table, data, contents = rebuild(place / path)
+                shots = {shots_path(place / path): shots_table(contents)}
+                for one, made in ({table: data} | shots).items():
+                    if made is not None:
+                        placing.write_file(one.parent, one.name, made)
+                        yield _Made(path=one.relative_to(place).as_posix(), data=made)
     yield from _results(place, settings, _versions(folder), track)
     for path, data in making.bids_files(place, settings).items():
         if path.endswith(".tsv"):

@@ -4,7 +4,8 @@
 - The onset is where half of the peak is passed, less the time that the model takes to get there.
 - Where the magnet turns, friction changes its sign, and the enclosure's acceleration leaps by (F_out + F_back)/M. Two
   straight lines, up to the turn and from it on, meet there with that step: what the hand does has none. The mean
-  friction (F_out + F_back)/2 is M/2 times the step.
+  friction (F_out + F_back)/2 is M/2 times the step. In a firm hand the magnet rests there for a while, held by less
+  than the whole friction: then the step is less, and the enclosure's acceleration rises no longer after it.
 
 Each has its standard uncertainty. What is expected goes through the same reckoning, at the sensor's own rate
 (`device.sensor.expected`), so that what the reckoning adds of its own is on both sides.
@@ -78,7 +79,9 @@ class ExpectedShot:
 class DeliveredShot:
     """What was measured of one shot, with standard uncertainties. `onset_s` is on the host's clock.
 
-    `friction_N` is `None` of a vibration, and where no step shows.
+    `friction_N` is `None` of a vibration, and where no step shows. `turn_rise`: how steeply the acceleration rises
+    after the turn, as a part of how it rises before. By the model it is 0.3 to 0.8, and below 0.15 where the magnet
+    rests at its turn; the friction is then as large or larger.
     """
 
     onset_s: float
@@ -87,6 +90,7 @@ class DeliveredShot:
     peak_u_m_s2: float
     friction_N: float | None = None
     friction_u_N: float | None = None
+    turn_rise: float | None = None
 
 
 def measured(trace: SensorTrace, pulse_start_s: float, expected: ExpectedShot) -> DeliveredShot | None:
@@ -106,15 +110,16 @@ def measured(trace: SensorTrace, pulse_start_s: float, expected: ExpectedShot) -
     top = min(recoil.start + int(np.abs(signal[recoil]).argmax()), len(time_s) - 2)
     peak, factor = _parabola(np.abs(signal[top - 1 : top + 2]))
     half_s, slope = _half_way(time_s, np.abs(signal), first, peak / 2)
-    friction = _friction(time_s - half_s + expected.rise_s, signal, noise, expected)
+    friction = _friction(time_s - half_s + expected.rise_s, signal, noise, expected) or (None, None, None)
     spacing_s = float(time_s[top] - time_s[top - 1])
     return DeliveredShot(
         onset_s=pulse_start_s + half_s - expected.rise_s,
         onset_u_s=math.hypot(noise / slope, spacing_s / math.sqrt(12), trace.clock_s),
         peak_m_s2=peak,
         peak_u_m_s2=math.hypot(noise * factor, expected.peak_sampling_m_s2),
-        friction_N=friction and friction[0],
-        friction_u_N=friction and friction[1],
+        friction_N=friction[0],
+        friction_u_N=friction[1],
+        turn_rise=friction[2],
     )
 
 
@@ -149,21 +154,38 @@ def _half_way(time_s: Vector, size: Vector, first: int, half: float) -> tuple[fl
     return float(time_s[before]) + max(0.0, half - float(size[before])) / slope, slope
 
 
-def _friction(time_s: Vector, signal: Vector, noise: float, expected: ExpectedShot) -> tuple[float, float] | None:
-    """The mean friction and its uncertainty in N, from the step at the turn; time counts from the onset."""
+def _friction(
+    time_s: Vector, signal: Vector, noise: float, expected: ExpectedShot
+) -> tuple[float, float, float] | None:
+    """The mean friction and its uncertainty in N, from the step at the turn, and the rise after that.
+
+    Time counts from the onset.
+    """
     if expected.turn_s is None:
         return None
     rate_Hz = min(MAX_RATE_HZ, (len(time_s) - 1) / float(time_s[-1] - time_s[0]))
     weights = _step_weights(rate_Hz)
     reach_s = len(weights) / rate_Hz / 2
     start_s, end_s = expected.turn_s * TURN_WITHIN[0] - reach_s, expected.turn_s * TURN_WITHIN[1] + reach_s
-    grid = np.arange(start_s, end_s, 1 / rate_Hz)
-    steps = np.correlate(np.interp(grid, time_s, signal), weights, "valid")
-    step = float(steps.max())
-    friction_N, noise_N = step * expected.mass_kg / 2, friction_uncertainty_N(noise, rate_Hz, expected.mass_kg)
+    signal = np.interp(np.arange(start_s, end_s, 1 / rate_Hz), time_s, signal)
+    steps = np.correlate(signal, weights, "valid")
+    at = int(steps.argmax())
+    friction_N, noise_N = (
+        float(steps[at]) * expected.mass_kg / 2,
+        friction_uncertainty_N(noise, rate_Hz, expected.mass_kg),
+    )
     if friction_N < STEP_NOISES * noise_N:
         return None
-    return friction_N, math.hypot(noise_N, expected.friction_sampling_N)
+    uncertain_N = math.hypot(noise_N, expected.friction_sampling_N)
+    return friction_N, uncertain_N, _rise(signal[at : at + len(weights)], rate_Hz)
+
+
+def _rise(signal: Vector, rate_Hz: float) -> float:
+    """The slope after the turn, which lies in the middle of these samples, as a part of that before."""
+    count, _ = _line_and_gap(rate_Hz)
+    places = np.arange(count) - (count - 1) / 2
+    before = abs(float(places @ signal[:count]))
+    return float(places @ signal[-count:]) / max(before, 1e-9)
 
 
 def friction_uncertainty_N(noise_m_s2: float, rate_Hz: float, mass_kg: float) -> float:  # noqa: N802 - the unit ends the name
@@ -174,8 +196,13 @@ def friction_uncertainty_N(noise_m_s2: float, rate_Hz: float, mass_kg: float) ->
 
 def _step_weights(rate_Hz: float) -> Vector:
     """What gives, of samples around a moment, the step there between two straight lines."""
-    count, gap = max(4, round(LINE_S * rate_Hz)), max(1, round(GAP_S * rate_Hz))
+    count, gap = _line_and_gap(rate_Hz)
     places = gap + np.arange(count, dtype=float)
     centred = places - places.mean()
     ahead = 1 / count - places.mean() * centred / (centred**2).sum()
     return np.concatenate([-ahead[::-1], np.zeros(2 * gap - 1), ahead])
+
+
+def _line_and_gap(rate_Hz: float) -> tuple[int, int]:
+    """How many samples a line has, and how far from the turn it begins."""
+    return max(4, round(LINE_S * rate_Hz)), max(1, round(GAP_S * rate_Hz))

@@ -6,33 +6,49 @@ with s^2 = within^2 + u^2, u its uncertainty. From the shots so far (those witho
 with mean m and variance v + s^2; z is its distance from that in standard deviations.
 
 - `outside`: |z| is beyond what one shot in very many is.
-- `slipped`: a sequential test (CUSUM; Page 1954) of a lasting change by d = 10 %, either way. With e = d/sqrt(v + s^2)
-  the logarithm of the likelihood ratio grows by e z - e^2/2 a shot, is never below 0, and marks at A. Without a change
-  the ratio's mean is 1 whatever came before, so at least e^A shots pass on average before a false mark (Lorden 1971).
+- `slipped`: a lasting change by d = 10 %, either way, since any shot k. Under each such hypothesis the level is
+  reckoned as well, with the shots since k taken back by d, and the likelihood of all shots is set against that without
+  a change. The sum of these ratios over k (Shiryaev and Roberts; Pollak 1985) grows by 1 a shot on average while
+  nothing has changed, so at least e^A shots pass on average until it is e^A, which marks. As long as a change lasts,
+  its shots are marked; they teach nothing, and the level is that of the hypothesis.
+- `slipped`, too: the friction beside the peak, which knows no scale of the sensor, is not what the model says from a
+  method's first shot on. That mean is looked at after 10 shots, and whenever they have doubled, and is said once. Only
+  shots count whose magnet does not rest at its turn: a firm hand holds it there, and the step is then less than
+  friction makes.
 
-The marks of all tests together are false less than once in `1 / FALSE_MARKS` shots: that sets A and the limit of z.
+The marks of all tests together are false less than once in `1 / FALSE_MARKS` shots: that sets A and the limits.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 
+import numpy as np
+
+from device.physics.hand import Vector
 from experiments.session.remarks import DeliveryMark
 
 FALSE_MARKS = 1e-4
 """Marks a shot while nothing is wrong, at the most."""
 SLIP = 0.10
 """The lasting change that is looked for, of what is expected."""
-_TESTS = 4
-"""Peak and friction, each up and down."""
-_OF_ONE_SHOT = 0.05
-"""The part of the false marks that is left to single shots."""
-SUM_LIMIT = math.log(_TESTS / FALSE_MARKS / (1 - _OF_ONE_SHOT))
-"""A: with e^A shots to a false mark, four tests are false less than so often."""
-Z_LIMIT = -NormalDist().inv_cdf(FALSE_MARKS * _OF_ONE_SHOT / _TESTS)
-"""Beyond this a single shot is not what the model allows."""
+_OF_ONE_SHOT, _OF_START = 0.05, 0.25
+"""The parts of the false marks that are left to single shots, and to a method's mean against the model."""
+SUM_LIMIT = math.log(2 / FALSE_MARKS / (1 - _OF_ONE_SHOT - _OF_START))
+"""A: with e^A shots to a false mark, peak and friction are false less than so often."""
+Z_LIMIT = -NormalDist().inv_cdf(FALSE_MARKS * _OF_ONE_SHOT / 4)
+"""Beyond this a single shot is not what the model allows: peak and friction, each up and down."""
+RESTS_BELOW = 0.2
+"""A `turn_rise` of less: the magnet rests at its turn (by the model, below 0.15)."""
+MAY_REST_BELOW, REST_SPREAD = 0.3, 0.05
+"""Assumed, of friction: from where on it is less sure, and how far it spreads where the magnet rests for long. By the
+model, with grips that scatter by a tenth, 0.035."""
+START_SHOTS = 10
+"""After so many shots a method's mean is first held against the model."""
+MODEL_SPREAD = 0.02
+"""Assumed, of friction beside the peak: the model's goes by 1.3 % (SD) with hands that differ by a quarter."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,15 +65,24 @@ FRICTION_SPREAD = DeliverySpread(between=0.10, within=0.015)
 """Assumed: over such grips the model's step moves by up to 10 %; within a run a hand's firmness changes by a tenth."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+def _none() -> Vector:
+    return np.empty(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DeliveryLevel:
-    """What a run's shots of a method came to so far, of one quantity; as parts of what is expected."""
+    """What a run's shots of a method came to so far, of one quantity; as parts of what is expected.
+
+    For each shot since which there may have been a change up: how far the level then lies from `mean`, and the
+    logarithms of the likelihood ratios of a change up, and of one down, where that lies on the other side.
+    """
 
     spread: DeliverySpread
     mean: float = 1.0
     variance: float
-    up: float = 0.0
-    down: float = 0.0
+    offsets: Vector = field(default_factory=_none)
+    ups: Vector = field(default_factory=_none)
+    downs: Vector = field(default_factory=_none)
 
     @classmethod
     def before(cls, spread: DeliverySpread) -> DeliveryLevel:
@@ -67,22 +92,116 @@ class DeliveryLevel:
 
 def after_shot(level: DeliveryLevel, part: float, part_u: float) -> tuple[DeliveryLevel, DeliveryMark]:
     """The level after a shot, and its mark. `part`, `part_u`: measured over expected, with its uncertainty."""
-    shot_variance = level.spread.within**2 + part_u**2
-    deviation = math.sqrt(level.variance + shot_variance)
-    z, change = (part - level.mean) / deviation, SLIP / deviation
-    up = max(0.0, level.up + change * z - change**2 / 2)
-    down = max(0.0, level.down - change * z - change**2 / 2)
-    if abs(z) > Z_LIMIT or max(up, down) >= SUM_LIMIT:
-        mark: DeliveryMark = "outside" if abs(z) > Z_LIMIT else "slipped"
-        return replace(level, up=0.0, down=0.0), mark
-    gain = level.variance / (level.variance + shot_variance)
+    variance, off = level.variance + level.spread.within**2 + part_u**2, part - level.mean
+    if abs(off) > Z_LIMIT * math.sqrt(variance):
+        return level, "outside"
+    shifts = SLIP + np.append(level.offsets, 0.0)
+    ups = np.append(level.ups, 0.0) + (off * shifts - shifts**2 / 2) / variance
+    downs = np.append(level.downs, 0.0) + (-off * shifts - shifts**2 / 2) / variance
+    if np.logaddexp.reduce(np.concatenate([ups, downs])) - math.log(2) >= SUM_LIMIT:
+        return _slipped(level, shifts - SLIP, ups, downs), "slipped"
+    gain = level.variance / variance
     return replace(
         level,
-        mean=level.mean + gain * (part - level.mean),
+        mean=level.mean + gain * off,
         variance=(1 - gain) * level.variance,
-        up=up,
-        down=down,
+        offsets=shifts - SLIP - gain * shifts,
+        ups=ups,
+        downs=downs,
     ), ""
+
+
+def _slipped(level: DeliveryLevel, offsets: Vector, ups: Vector, downs: Vector) -> DeliveryLevel:
+    """The level by the likeliest change, which is the one that is left; a shot without it takes its mark away."""
+    up = ups.max() >= downs.max()
+    k = int((ups if up else downs).argmax())
+    mean = level.mean + (offsets[k] if up else -offsets[k])
+    full, none = np.array([SUM_LIMIT + math.log(2)]), np.array([-math.inf])
+    return replace(level, mean=float(mean), offsets=np.zeros(1), ups=full if up else none, downs=none if up else full)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartLevel:
+    """The mean of friction beside the peak since a method's first shot, and its weight; `said`: it was marked."""
+
+    shots: int = 0
+    mean: float = 1.0
+    weight: float = 0.0
+    said: bool = False
+
+
+def after_start(level: StartLevel, part: float, part_u: float) -> tuple[StartLevel, DeliveryMark]:
+    """The mean with one more shot, and its mark. `part`: friction over peak, both as parts of what is expected."""
+    one, shots = 1 / (FRICTION_SPREAD.within**2 + part_u**2), level.shots + 1
+    weight = level.weight + one
+    mean = level.mean + (part - level.mean) * one / weight
+    looks = not level.said and shots % START_SHOTS == 0 and (shots // START_SHOTS).bit_count() == 1
+    far = looks and abs(mean - 1) > start_limit(shots) * math.hypot(MODEL_SPREAD, weight**-0.5)
+    return StartLevel(shots=shots, mean=mean, weight=weight, said=level.said or far), "slipped" if far else ""
+
+
+def start_limit(shots: int) -> float:
+    """So many standard deviations off, a mean after so many shots is marked: as they double, so does its share."""
+    return -NormalDist().inv_cdf(FALSE_MARKS * _OF_START * shots / 4)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShotParts:
+    """A shot as parts of what is expected, with uncertainties; friction is `None` where it is not known.
+
+    `turn_rise`: as in `device.sensor.measuring.DeliveredShot`.
+    """
+
+    peak: float
+    peak_u: float
+    friction: float | None = None
+    friction_u: float = 0.0
+    turn_rise: float = 1.0
+
+    @property
+    def rests(self) -> bool:
+        """Whether the magnet rested at its turn."""
+        return self.turn_rise < RESTS_BELOW
+
+    @property
+    def friction_spread(self) -> float:
+        """The friction's uncertainty, with what a rest at the turn takes from the step."""
+        rest = min(1.0, max(0.0, 1 - self.turn_rise / MAY_REST_BELOW))
+        return math.hypot(self.friction_u, rest * REST_SPREAD)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodLevels:
+    """What a run's shots of a method came to so far."""
+
+    peak: DeliveryLevel = field(default_factory=lambda: DeliveryLevel.before(PEAK_SPREAD))
+    friction: DeliveryLevel = field(default_factory=lambda: DeliveryLevel.before(FRICTION_SPREAD))
+    start: StartLevel = StartLevel()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """A mark, of what, and how far that is from what it is held against, as a part. Empty where there is none."""
+
+    mark: DeliveryMark = ""
+    quantity: str = ""
+    change: float = 0.0
+
+
+def judged(levels: MethodLevels, shot: ShotParts) -> tuple[MethodLevels, Judgement]:
+    """The levels after a shot, and what is said of it: of the peak before the friction, of this before the mean."""
+    peak, mark = after_shot(levels.peak, shot.peak, shot.peak_u)
+    found = [Judgement(mark=mark, quantity="peak", change=shot.peak / levels.peak.mean - 1)]
+    levels = replace(levels, peak=peak)
+    if shot.friction is not None:
+        friction, mark = after_shot(levels.friction, shot.friction, shot.friction_spread)
+        found.append(Judgement(mark=mark, quantity="friction", change=shot.friction / levels.friction.mean - 1))
+        levels = replace(levels, friction=friction)
+        if not shot.rests and not any(one.mark for one in found):
+            start, mark = after_start(levels.start, shot.friction / shot.peak, math.hypot(shot.friction_u, shot.peak_u))
+            found.append(Judgement(mark=mark, quantity="friction beside the peak", change=start.mean - 1))
+            levels = replace(levels, start=start)
+    return levels, next((one for one in found if one.mark), Judgement())
 
 
 def shots_to_see(part_u: float, spread: DeliverySpread = FRICTION_SPREAD) -> float:

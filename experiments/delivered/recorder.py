@@ -18,15 +18,16 @@ from device import Gun, GunStatus, Shot, ShotReport
 from device.methods import Method
 from device.parameters import GunParameters
 from device.sensor.link import SensorEnd, SensorLink
+from device.sensor.measuring import DeliveredShot, ExpectedShot
 from device.sensor.process import ShotReply
 from device.sensor.simulated import SimulatedSensor, measures_by_model
 from device.sensor.streams import SensorError
 from device.words import Identity, Pulse
 from experiments.clock import Clock
-from experiments.delivered.marks import FRICTION_SPREAD, PEAK_SPREAD, DeliveryLevel, after_shot
+from experiments.delivered.marks import Judgement, MethodLevels, ShotParts, judged
 from experiments.live_run import LiveRun, Screen
 from experiments.session import events, judging
-from experiments.session.remarks import NOT_DELIVERED, DeliveryMark, Noted, Remark, ShotMeasured
+from experiments.session.remarks import NOT_DELIVERED, Noted, Remark, ShotMeasured
 from experiments.session.states import ARMED, Position, State
 from experiments.session.steps import FireShot, Outcome, Present, Repeated, Step
 
@@ -79,7 +80,7 @@ class ShotRecorder:
         self._live: LiveRun | None = None
         self._trouble: Callable[[str], None] = lambda _: None
         self._fired: queue.SimpleQueue[ShotFired | None] = queue.SimpleQueue()
-        self._levels: dict[tuple[str, str], DeliveryLevel] = {}
+        self._levels: dict[str, MethodLevels] = {}
         self._step: Step | None = None
         self._shots = 0
         self._ended = self._silent = False
@@ -227,23 +228,11 @@ class ShotRecorder:
             peak_u_m_s2=round(seen.peak_u_m_s2, 3),
             friction_N=None if seen.friction_N is None else round(seen.friction_N, 5),
             friction_u_N=None if seen.friction_u_N is None else round(seen.friction_u_N, 5),
+            turn_rise=None if seen.turn_rise is None else round(seen.turn_rise, 3),
         )
-        marks = [self._mark(found.method, "peak", seen.peak_m_s2, seen.peak_u_m_s2, expected.peak_m_s2)]
-        if seen.friction_N is not None and seen.friction_u_N is not None and expected.friction_N:
-            marks += [self._mark(found.method, "friction", seen.friction_N, seen.friction_u_N, expected.friction_N)]
-        mark, because = next((one for one in marks if one[0]), ("", ""))
-        return replace(found, mark=mark, because=because)
-
-    def _mark(self, method: str, what: str, value: float, u: float, expected: float) -> tuple[DeliveryMark, str]:
-        spread = PEAK_SPREAD if what == "peak" else FRICTION_SPREAD
-        level = self._levels.get((method, what), DeliveryLevel.before(spread))
-        part = value / expected
-        self._levels[method, what], mark = after_shot(level, part, u / expected)
-        unit = "m/s²" if what == "peak" else "N"
-        return (
-            mark,
-            f"{what} {value:.3g} {unit}, {100 * (part / level.mean - 1):+.0f} % from the shots before" if mark else "",
-        )
+        levels = self._levels.get(found.method, MethodLevels())
+        self._levels[found.method], judgement = judged(levels, parts_of(seen, expected))
+        return replace(found, mark=judgement.mark, because=reason_of(judgement, seen))
 
     def _want_again(self, live: LiveRun, found: ShotMeasured) -> None:
         """Where the design says so, the trial is to come again, once."""
@@ -277,6 +266,28 @@ class ShotRecorder:
 
 _SILENT = "The sensor is silent: no sample comes. The run goes on; its shots are marked “not-measured” until one does."
 _HEARD = "The sensor is heard again."
+
+
+def parts_of(seen: DeliveredShot, expected: ExpectedShot) -> ShotParts:
+    """A shot as parts of what is expected of it."""
+    peak = ShotParts(peak=seen.peak_m_s2 / expected.peak_m_s2, peak_u=seen.peak_u_m_s2 / expected.peak_m_s2)
+    if seen.friction_N is None or seen.friction_u_N is None or not expected.friction_N:
+        return peak
+    friction, friction_u = seen.friction_N / expected.friction_N, seen.friction_u_N / expected.friction_N
+    return replace(peak, friction=friction, friction_u=friction_u, turn_rise=seen.turn_rise or 0.0)
+
+
+def reason_of(judgement: Judgement, seen: DeliveredShot) -> str:
+    """Why a shot is marked; empty if it is not."""
+    far = f"{100 * judgement.change:+.0f} %"
+    match judgement.quantity:
+        case "peak":
+            return f"peak {seen.peak_m_s2:.3g} m/s², {far} from the shots before"
+        case "friction":
+            return f"friction {seen.friction_N:.3g} N, {far} from the shots before"
+        case "friction beside the peak":
+            return f"friction beside the peak, {far} from the model since the method's first shot"
+    return ""
 
 
 def driven(actuator: Method, shot: Shot) -> Method:

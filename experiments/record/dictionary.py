@@ -18,7 +18,7 @@ _PAGE = Path(__file__).with_name("dictionary.md")
 def dictionary() -> str:
     """The data dictionary as Markdown."""
     names = {f"sub-<ID>_task-{experiment}_{FILE_SUFFIX[experiment]}.csv": TABLES[experiment] for experiment in TABLES}
-    names["sub-<ID>_task-<experiment>_shots.csv"] = SHOTS
+    names[_SHOTS_NAME] = SHOTS
     tables = "\n".join(line for name, columns in names.items() for line in _table(name, columns))
     return _PAGE.read_text(encoding="utf-8").replace("{tables}", tables)
 
@@ -27,6 +27,15 @@ def design_dictionary(design: DesignConfig) -> str:
     """The columns of a design's table as Markdown, to lie beside its logs."""
     head = f"# {design.title}\n\nOne row a planned trial, also those not reached. Empty means missing; 0 is a value.\n"
     return "\n".join([head, *_table(f"sub-<ID>_task-{design.design}_{design.table}.csv", columns(design))])
+
+
+def shots_dictionary() -> str:
+    """The columns of what a sensor measured as Markdown, to lie beside its tables."""
+    head = "# What a sensor measured\n\nOne row a shot that was fired. Empty means missing; 0 is a value.\n"
+    return "\n".join([head, *_table(_SHOTS_NAME, SHOTS)])
+
+
+_SHOTS_NAME = "sub-<ID>_task-<experiment>_shots.csv"
 
 
 def _table(name: str, columns: Iterable[Column]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from analysis.report.section import Picture, Section, Table
 from analysis.summary.delivered import DeliveredCourse, drift
 from analysis.summary.figures.delivered import MOST_RUN_PANELS
 from analysis.summary.sections.content import ReportData
+from experiments.delivered.marks import START_SHOTS
 
 DELIVERED_FIGURE = "figure-delivered"
 _HEADER = (
@@ -35,7 +36,23 @@ def delivered_section(report: ReportData) -> Iterator[Section]:
     table = Table(
         caption="Shots as they were delivered; drift from the first shot to the last, ± SE", header=_HEADER, rows=rows
     )
-    yield Section(title="Was it delivered?", paragraphs=(said,), pictures=(_picture(courses),), tables=(table,))
+    paragraphs = (said, *_start_unknown(courses))
+    yield Section(title="Was it delivered?", paragraphs=paragraphs, pictures=(_picture(courses),), tables=(table,))
+
+
+def _start_unknown(courses: Sequence[DeliveredCourse]) -> Iterator[str]:
+    """Where a slip from the first shot on would not have been seen."""
+    hidden = [one for one in courses if one.start_unknown]
+    if hidden:
+        named = "; ".join(
+            f"{one.participant}, {one.experiment}, {display_name(one.method)} ({one.moving} of {len(one.marks)} shots)"
+            for one in hidden
+        )
+        yield (
+            f"A damper that had slipped by 10 % before a method's first shot could not be told in: {named}. For that "
+            f"{START_SHOTS} shots are needed whose friction is known and whose magnet does not rest at its turn, where "
+            "a firm hand holds it. Compare the levels below."
+        )
 
 
 def _row(one: DeliveredCourse) -> Iterator[str]:
