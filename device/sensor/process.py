@@ -10,10 +10,9 @@ from itertools import islice
 import numpy as np
 
 from device.methods import Method
-from device.physics.hand import Vector
 from device.sensor.expected import expected_shot
 from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
-from device.sensor.streams import Sample, SensorClock
+from device.sensor.streams import ClockLine, Sample, SensorClock
 
 KEPT_S = 5.0
 """Samples of so long are kept."""
@@ -101,29 +100,28 @@ class SampleBuffer:
             why = "nothing moves in this shot by the model" if self.rate_Hz > LEAST_RATE_HZ else "too few samples"
             return ShotReply(number=shot.number, because=why)
         reply = ShotReply(number=shot.number, expected=expected)
-        end_s, times, clock_s = shot.pulse_start_s + expected.until_s, *self._host_times()
-        if times[-1] < end_s:
+        end_s = shot.pulse_start_s + expected.until_s
+        if now_s < end_s:
+            return None
+        line = self._clock.line()
+        if line.host_s(np.array(self.last_s)) < end_s:
             late = now_s > end_s + SAMPLES_S
             return replace(reply, because="the sensor gave no samples of it") if late else None
         try:
-            trace = self._trace(times, clock_s, shot.pulse_start_s - BEFORE_S, end_s)
+            trace = self._trace(line, shot.pulse_start_s - BEFORE_S, end_s)
             return replace(reply, seen=measured(trace, shot.pulse_start_s, expected))
         except ValueError as error:
             return replace(reply, because=str(error))
 
-    def _host_times(self) -> tuple[Vector, float]:
-        """The times of all samples on this machine's clock, and their uncertainty as a whole."""
-        line = self._clock.line()
-        return line.host_s(np.array([time_s for time_s, _ in self._samples])), line.u_s
-
-    def _trace(self, times: Vector, clock_s: float, start_s: float, end_s: float) -> SensorTrace:
+    def _trace(self, line: ClockLine, start_s: float, end_s: float) -> SensorTrace:
         """The samples of a time. `ValueError`: some are missing."""
+        times = line.host_s(np.array([time_s for time_s, _ in self._samples]))
         found = slice(*np.searchsorted(times, (start_s, end_s)).tolist())
         gap_s = float(np.diff(times[found], prepend=start_s, append=end_s).max())
         if gap_s > MAX_GAP_S:
             raise ValueError(f"its trace has a gap of {gap_s:.3f} s")
         values = np.array([value for _, value in islice(self._samples, found.start, found.stop)])
-        return SensorTrace(time_s=times[found], acceleration_m_s2=values, clock_s=clock_s)
+        return SensorTrace(time_s=times[found], acceleration_m_s2=values, clock_s=line.u_s)
 
 
 def _stepped(rate_Hz: float) -> float:
