@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,7 @@ from experiments.record.journal import JournalError
 from experiments.record.tail import JournalTail
 from experiments.watch import server as serving
 from experiments.watch.folder import FolderWatch, Reader, watched_folder
-from experiments.watch.page import PAGE_PARTS, page_parts
+from experiments.watch.page import PAGE_PARTS, page_parts, whole_page
 from experiments.watch.runs import RunRow
 from experiments.watch.server import WatchServer
 from tests.conftest import Recoil, refused
@@ -223,6 +224,29 @@ def test_a_journal_that_is_set_aside_gives_way_to_the_new_one(journal: Path, who
     assert ([one.done for one in seen.rows], seen.set_aside) == ([1], 1)
 
 
+@pytest.mark.parametrize("kind", ["ask", "finished"])
+def test_a_journal_that_is_deleted_is_said_to_be_gone_with_what_was_read_until_it_is_back(
+    kind: str, journal: Path, whole: bytes
+) -> None:
+    data = whole if kind == "finished" else part(whole, "ask", 5)
+    journal.write_bytes(data)
+    watch = FolderWatch(results_of(journal))
+    (before,) = rows(watch)
+    shutil.rmtree(journal.parent)
+    seen = watch.look()
+    assert seen is not None
+    (shown,) = seen.rows
+    assert (shown.state, shown.name, shown.done, shown.problem) == ("gone", "P01", before.done, "")
+    summary, cards, finished = page_parts(seen)
+    assert ("1 gone" in summary, "Its journal is gone" in cards, "P01" in finished) == (True, True, False)
+    for _ in range(3):
+        watch.look()
+    journal.parent.mkdir()
+    journal.write_bytes(data)
+    (back,) = rows(watch)
+    assert back == before
+
+
 def damaged(data: bytes, at: int) -> bytes:
     return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
 
@@ -369,6 +393,41 @@ def test_the_page_is_whole_without_a_script_and_holds_nothing_from_elsewhere(ser
     assert asked(server, f"/{server.token}")[2]["Location"] == f"/{server.token}/"
 
 
+class Outline(HTMLParser):
+    """Which elements stand directly in which, and whether every one that is opened is closed where it should be."""
+
+    EMPTY = ("meta", "link")
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.open, self.within = ["page"], set[tuple[str, str]]()
+        self.feed(page)
+        assert self.open == ["page"]
+
+    def handle_starttag(self, tag: str, _: object) -> None:
+        self.within.add((self.open[-1], tag))
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def inside(self, *tags: str) -> set[str]:
+        return {inner for outer, inner in self.within if outer in tags}
+
+
+def test_lists_hold_items_and_lines_of_text_hold_no_blocks(journal: Path, whole: bytes) -> None:
+    for data in (None, whole, part(whole, "ask", 5)):
+        if data is not None:
+            journal.write_bytes(data)
+        seen = FolderWatch(results_of(journal)).look()
+        assert seen is not None
+        outline = Outline(whole_page(page_parts(seen), "results").decode())
+        assert outline.inside("ul") <= {"li"}
+        assert outline.inside("dl") <= {"dt", "dd"}
+        assert outline.inside("p", "h1", "h2", "h3", "li", "dt", "dd") <= {"span", "small", "b", "code"}
+
+
 def test_who_is_not_meant_is_refused(server: WatchServer) -> None:
     there = f"/{server.token}/"
     assert asked(server, "/")[0] == 403
@@ -415,6 +474,7 @@ def test_viewers_who_are_one_too_many_are_turned_away(journal: Path, monkeypatch
     monkeypatch.setattr(serving, "VIEWERS", 1)
     reader = Reader(FolderWatch(results_of(journal)), page_parts)
     with WatchServer(reader, 0, "results") as running:
+        reader.start()
         thread = threading.Thread(target=running.serve_forever, args=(0.01,))
         thread.start()
         first = http.client.HTTPConnection(serving.HOST, running.page.port, timeout=PATIENCE_S)

@@ -70,7 +70,7 @@ class FolderWatch:
         if now_s - self._checked_s >= CHECK_S:
             self._checked_s = now_s
             for run in self._runs.values():
-                if not run.over:
+                if not (run.over or run.gone):
                     run.check()
         if not changed and now_s - self._told_s < TICK_S:
             return None
@@ -95,7 +95,7 @@ class FolderWatch:
 
     def _find(self) -> bool:
         """Know the journals that are there now; whether they are others than before."""
-        before = (self._set_aside, self._problem, len(self._runs) + len(self._unread))
+        before = self._there()
         found, self._set_aside, self._problem = dict[Path, float](), 0, ""
         try:
             for entry in journals_in(self.folder):
@@ -106,9 +106,15 @@ class FolderWatch:
         except OSError as error:
             self._problem = f"{error.filename or self.folder}: cannot be read ({error.strerror})"
         if not self._problem:
-            self._runs = {path: run for path, run in self._runs.items() if path in found}
+            for path, run in self._runs.items():
+                run.gone = path not in found
             self._unread = {path: at_s for path, at_s in found.items() if path not in self._runs}
-        return before != (self._set_aside, self._problem, len(self._runs) + len(self._unread))
+        return before != self._there()
+
+    def _there(self) -> tuple[int, str, int, int]:
+        """What a look at the folder alone can change."""
+        gone = sum(run.gone for run in self._runs.values())
+        return self._set_aside, self._problem, len(self._runs) + len(self._unread), gone
 
     def _read_unread(self, until_s: float) -> bool:
         """Read journals for the first time, the youngest first; whether there were any."""

@@ -21,6 +21,7 @@ _SIGNS: dict[WatchedState, str] = {
     "paused": "‖",
     "emergency stop": "■",
     "damaged": "!",
+    "gone": "?",
     "broken off": "×",
     "stopped": "□",
     "beginning": "…",
@@ -30,6 +31,8 @@ _SIGNS: dict[WatchedState, str] = {
 """A sign beside each word, so that no colour has to be told from another. In order of urgency."""
 
 _MEANING: dict[WatchedState, str] = {
+    "gone": "Its journal is gone: it was deleted, moved or set aside while it was watched. What stands here was read "
+    "before.",
     "broken off": "No end is on record, and no process of this machine holds the journal: the run was killed, goes on "
     "at another machine, or this is a copy. If it was killed, resume it.",
     "stopped": "It was stopped and can be resumed.",
@@ -57,8 +60,8 @@ def page_parts(seen: Watched) -> tuple[str, ...]:
     still_open.sort(key=lambda row: order.index(row.state))  # stable: codes stay in order
     finished = [row for row in seen.rows if row.state == "finished"]
     cards = "".join(_card(row, seen.utc) for row in still_open) or "<p class=note>No run is open.</p>"
-    lines = "".join(map(_line, finished)) or "<p class=note>None yet.</p>"
-    return tuple(" ".join(part.split("\n")) for part in (_summary(seen), cards, f"<ul>{lines}</ul>"))
+    lines = f"<ul>{''.join(map(_line, finished))}</ul>" if finished else "<p class=note>None yet.</p>"
+    return tuple(" ".join(part.split("\n")) for part in (_summary(seen), cards, lines))
 
 
 def _summary(seen: Watched) -> str:
@@ -117,7 +120,7 @@ def _facts(row: RunRow, now: datetime) -> str:
 def _last_text(row: RunRow, now: datetime) -> str:
     if row.virtual:
         return "on a virtual clock"
-    if row.state in ("stopped", "broken off"):
+    if row.state in ("stopped", "broken off", "gone"):
         return date_text(row.last_utc)
     return f"{ago_text(age_s(row.last_utc, now))} ago"
 

@@ -25,12 +25,21 @@ from experiments.session.states import EMERGENCY, Position, State, after, entere
 from experiments.study.folders import data_of
 
 WatchedState = Literal[
-    "running", "paused", "emergency stop", "damaged", "broken off", "stopped", "beginning", "not begun", "finished"
+    "running",
+    "paused",
+    "emergency stop",
+    "damaged",
+    "gone",
+    "broken off",
+    "stopped",
+    "beginning",
+    "not begun",
+    "finished",
 ]
 """How a watched run stands.
 
-`broken off`: neither an end is on record nor does a process of this machine hold the journal; `beginning`: one holds
-it, and nothing is on record yet.
+`gone`: its journal was there and is not any more; `broken off`: neither an end is on record nor does a process of this
+machine hold the journal; `beginning`: one holds it, and nothing is on record yet.
 """
 UNDER_WAY: tuple[WatchedState, ...] = ("running", "paused")
 """The states in which time goes by that was planned."""
@@ -284,6 +293,8 @@ class WatchedRun:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.gone = False
+        """Whether the journal was there and is not any more."""
         self._tail = JournalTail(path)
         self._so_far: RunSoFar | None = None
         self._problem = ""
@@ -299,6 +310,8 @@ class WatchedRun:
 
     def look(self) -> bool:
         """Take what is new on the disk; whether there was anything."""
+        if self.gone:
+            return False
         try:
             news = self._tail.look()
             if not (news.anew or news.records):
@@ -332,6 +345,8 @@ class WatchedRun:
         is resumed just then has patience.
         """
         before = self._held
+        if self.gone:
+            return False
         try:
             self._held = not (self._so_far and self._so_far.end) and not self.over and storage.is_held(self.path)
         except OSError:
@@ -341,7 +356,9 @@ class WatchedRun:
         return self._held != before
 
     def row(self, utc_now: datetime) -> RunRow:
-        """What there is to show."""
+        """What there is to show; of a journal that is gone, what was read before."""
+        if self.gone:
+            return replace(self._finished or self._made(utc_now), state="gone", doing="", left_s=None, problem="")
         if self._row is None or self._row.state in UNDER_WAY:
             self._row = self._made(utc_now)
             if self._row.state == "finished":
