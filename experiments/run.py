@@ -88,7 +88,8 @@ class ParticipantOptions:
 class RunRequest:
     """Who does what, where, at which screen, with which gun and seed.
 
-    `sensor` is empty where nothing measures what is delivered. `seed` is `None` where the config or the system gives
+    `sensor` is empty where nothing measures what is delivered; with `markers` what happens goes to Lab Streaming Layer
+    meanwhile. `seed` is `None` where the config or the system gives
     it. A `practice` is not analysed: it has files of its own and can be done again; nothing of a `training` is kept.
     `anew_reason` is why an unfinished run is set aside for a fresh one: for the register and the head of the new
     journal. At the console the participant may have `options` of their own, and a `visual` run is worked by a
@@ -100,6 +101,7 @@ class RunRequest:
     results: Path
     gun: str = "simulated"
     sensor: str = ""
+    markers: bool = False
     seed: int | None = None
     again: Again = "ask"
     anew_reason: str = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -63,27 +63,23 @@ def run_session(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
     _check_terminal(request)
     _say_beforehand(request)
     try:
-        return _SCREENS[request.screen](request).place
+        with _markers(request.results, _say) if request.markers else nullcontext():
+            return _SCREENS[request.screen](request).place
     except RunStopped as stop:
-        with suppress(OSError):  # where the terminal is gone, nobody reads it
-            sys.stderr.write(f"recoil: stopped: {stop}. Go on with --resume.\n")
+        _say(f"stopped: {stop}. Go on with --resume.")
         raise KeyboardInterrupt from stop
 
 
-@contextmanager
-def with_markers(request: RunRequest, *, wanted: bool) -> Iterator[None]:
-    """Have what happens in the run sent to Lab Streaming Layer meanwhile, if that is wanted. Never an error."""
-    if not wanted:
-        yield
-        return
+def _markers(results: Path, say: Callable[[str], None]) -> AbstractContextManager[None]:
+    """Have what happens in a results folder sent to Lab Streaming Layer meanwhile. Never an error: it is said."""
     from experiments.watch.markers_process import markers_beside  # noqa: PLC0415 - most runs need none of it
 
-    def say(text: str) -> None:
-        with suppress(OSError):  # where the terminal is gone, nobody reads it
-            sys.stderr.write(f"recoil: {text}\n")
+    return markers_beside(results, say)
 
-    with markers_beside(request.results, say):
-        yield
+
+def _say(text: str) -> None:
+    with suppress(OSError):  # where the terminal is gone, nobody reads it
+        sys.stderr.write(f"recoil: {text}\n")
 
 
 def _say_beforehand(request: RunRequest) -> None:
@@ -94,8 +90,7 @@ def _say_beforehand(request: RunRequest) -> None:
         *unread(setup, results, read_register(results)),
         *few_of_each(run_warnings(setup, results, there)),
     ):
-        with suppress(OSError):
-            sys.stderr.write(f"recoil: {message}\n")
+        _say(message)
 
 
 def _check_resumable(request: RunRequest) -> None:
@@ -220,10 +215,9 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
     try:
-        live.lab_day(request, wanted.usable())
+        live.lab_day(request, wanted.usable(), _markers)
     except KeyboardInterrupt as signalled:
-        with suppress(OSError):  # where the terminal is gone, nobody reads it
-            sys.stderr.write(f"recoil: ended by {signalled}\n")
+        _say(f"ended by {signalled}")
         raise
 
 

@@ -316,3 +316,22 @@ def test_what_was_asked_for_is_ticked_and_a_screen_that_is_not_there_is_refused(
         code, said = screen.end()
     assert code == 2
     assert "--participant-monitor 7: there is no such screen; known are 0: " in said
+
+
+def test_where_there_can_be_no_markers_the_window_says_so_and_begins_no_run(
+    pilot: Path, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (pilot / "fake").mkdir()
+    (pilot / "fake" / "pylsl.py").write_text("raise ImportError('no pylsl')")
+    monkeypatch.setenv("PYTHONPATH", str(pilot / "fake"))
+    before = read_register(pilot / LONG)
+    with started(pilot, display, "--lsl") as (screen, eye):
+        assert "sends markers (LSL)" in wait_for(eye, having("Next: P01"))["ticked"]
+        enter(screen)
+        screen.keys.press("p", "Control_L")
+        said = wait_for(eye, having("no markers: no Lab Streaming Layer here (no pylsl): install the extra `lsl`"))
+        assert any("The run was not begun: mend that, or untick" in text for text in said["texts"])
+        screen.keys.press("q", "Control_L")
+        assert screen.end()[0] == 0
+    assert not list((pilot / LONG).glob("sub-*/*practice*"))
+    assert before != read_register(pilot / LONG)

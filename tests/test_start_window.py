@@ -293,6 +293,19 @@ def test_the_language_is_chosen_where_there_are_several_and_chinese_says_that_no
     assert window.choice.language.code == "zh"
 
 
+def test_markers_are_ticked_and_a_sensor_is_named_in_the_window_or_on_the_command_line(opened: Open) -> None:
+    plain = opened()
+    assert (plain.form.markers.isChecked(), plain.form.sensor.text()) == (False, "")
+    fill(plain, "P01")
+    plain.form.markers.setChecked(True)
+    plain.form.sensor.setText(" csv:/dev/nowhere ")
+    key(plain, "Return", CTRL)
+    assert plain.choice is not None
+    assert (plain.choice.markers, plain.choice.sensor) == (True, "csv:/dev/nowhere")
+    named = opened(markers=True, sensor="simulated")
+    assert (named.form.markers.isChecked(), named.form.sensor.text()) == (True, "simulated")
+
+
 @pytest.mark.parametrize(
     ("entered", "words"),
     [

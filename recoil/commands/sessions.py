@@ -113,6 +113,7 @@ def run(
         results=results,
         gun=gun,
         sensor=sensor or "",
+        markers=lsl,
         seed=seed,
         again=session.again(resume=resume, fresh=fresh, reason=reason),
         anew_reason=reason,
@@ -124,11 +125,10 @@ def run(
         ),
     )
     wanted = session.LanguageOptions(code=language, folder=catalogues, unchecked=unchecked)
-    with session.with_markers(request, wanted=lsl):
-        if participant is None:
-            session.run_lab_day(request, wanted)
-            return
-        done = session.run_session(request, wanted)
+    if participant is None:
+        session.run_lab_day(request, wanted)
+        return
+    done = session.run_session(request, wanted)
     show({"journal": str(done.journal), "table": str(done.table)}, f"Done: {done.table}", as_json)
 
 

@@ -23,6 +23,8 @@ _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_a
 _FACT_TEXT = {"age_years": "Age in years", "sex": "Sex", "handedness": "Handedness"}
 _HOW_TO_START = "Read the code back with the participant, fill in what is asked, then Start."
 _AGE_DIGITS = 3
+SENDS_MARKERS = "sends markers (LSL)"
+_NO_SENSOR = "none; csv:PATH or another"
 
 
 class Form(QtWidgets.QFrame):
@@ -42,9 +44,13 @@ class Form(QtWidgets.QFrame):
         self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
         self.own_screen, self.own_keys = TickBox("rates on their own screen"), TickBox("answers with own keys")
         self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
+        self.sensor, self.markers = LineEdit(), TickBox(SENDS_MARKERS)
         self.remark = TextLines("remark")
         self._typed: dict[str, str] | None = None
         self._tick(opening.options)
+        self.markers.setChecked(opening.markers)
+        self.sensor.setText(opening.sensor)
+        self.sensor.setPlaceholderText(_NO_SENSOR)
         self._lay_out()
         self._connect()
 
@@ -71,16 +77,17 @@ class Form(QtWidgets.QFrame):
         rows += [(_FACT_TEXT[fact], widget) for fact, widget in self.facts.items()]
         rows += [("Participant", self.own_screen), ("", self.own_keys), ("", self.noise)]
         rows += [("Their language", self.languages)] if len(self._languages) > 1 else []
-        return rows + ([("Their monitor", self.monitor)] if self.monitor.count() > 1 else [])
+        rows += [("Their monitor", self.monitor)] if self.monitor.count() > 1 else []
+        return [*rows, ("The run", self.markers), ("Sensor", self.sensor)]
 
     def _connect(self) -> None:
-        for line in (self.code, self.code_again, *self.facts.values()):
+        for line in (self.code, self.code_again, self.sensor, *self.facts.values()):
             if isinstance(line, LineEdit):
                 line.textChanged.connect(self.edited)
         for box in (self.experiment, self.languages, self.monitor, *self.facts.values()):
             if isinstance(box, ListBox):
                 box.currentIndexChanged.connect(self.edited)
-        for tick in (self.own_screen, self.own_keys, self.noise):
+        for tick in (self.own_screen, self.own_keys, self.noise, self.markers):
             tick.toggled.connect(self.edited)
         self.code.textChanged.connect(self.code_edited)
         self.experiment.currentIndexChanged.connect(self.experiment_edited)
@@ -173,7 +180,7 @@ class Opening:
     """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says.
 
     `named` is the experiment whose config was named when the program was started; later windows have none.
-    `language` is the code of one of the `languages`.
+    `language` is the code of one of the `languages`; `sensor` and `markers` are as of a `RunRequest`.
     """
 
     gun: str
@@ -181,6 +188,8 @@ class Opening:
     languages: tuple[Language, ...] = (ENGLISH,)
     language: str = ENGLISH.code
     options: ParticipantOptions = field(default_factory=ParticipantOptions)
+    sensor: str = ""
+    markers: bool = False
     participant_id: str = ""
     said: str = ""
 

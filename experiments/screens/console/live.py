@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -28,7 +28,7 @@ from experiments.record.journal import JournalError
 from experiments.run import Again, Finished, RunRequest, UnfinishedRun, gone_on_with
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
-from experiments.screens.console.form import Opening, monitors
+from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
 from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
@@ -67,7 +67,11 @@ def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
         return console.run()
 
 
-def lab_day(request: RunRequest, languages: tuple[Language, ...]) -> None:
+OpenMarkers = Callable[[Path, Callable[[str], None]], AbstractContextManager[None]]
+"""Has the runs of a results folder sent to Lab Streaming Layer meanwhile; what is in the way is said."""
+
+
+def lab_day(request: RunRequest, languages: tuple[Language, ...], markers: OpenMarkers) -> None:
     """One run after the other from the start window, until it is closed.
 
     `request` says what all have in common, and what is ticked at first; `languages` which there are to choose from.
@@ -77,15 +81,20 @@ def lab_day(request: RunRequest, languages: tuple[Language, ...]) -> None:
     check_monitor(request.options.monitor)
     study, named = study_of(request), request.setup.config.experiment
     opening = Opening(
-        gun=request.gun, named=named, options=request.options, languages=languages, language=request.language.code
+        gun=request.gun,
+        named=named,
+        languages=languages,
+        language=request.language.code,
+        options=request.options,
+        sensor=request.sensor,
+        markers=request.markers,
     )
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
-            choice = replace(choice, catalogues=request.catalogues)
-            said = _of_the_day(request, study, replace(choice, sensor="" if choice.training else request.sensor))
+            said = _of_the_day(request, study, replace(choice, catalogues=request.catalogues), markers)
             code = "" if choice.training else choice.participant_id
             opening = replace(opening, named="", options=choice.options, language=choice.language.code)
-            opening = replace(opening, participant_id=code, said=said)
+            opening = replace(opening, sensor=choice.sensor, markers=choice.markers, participant_id=code, said=said)
     if signalled:
         raise KeyboardInterrupt(signalled[0])
 
@@ -108,17 +117,31 @@ def _band_and_last(study: StudyFolder, choice: RunRequest) -> tuple[str, str]:
     return "", f"Next: {later[0]}." if later else THANK_PARTICIPANT
 
 
-def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest) -> str:
+def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest, markers: OpenMarkers) -> str:
     """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
+    said: list[str] = []
     with ExitStack() as stack:
-        results = Path(stack.enter_context(tempfile.TemporaryDirectory())) if choice.training else request.results
-        try:
-            band, last = _band_and_last(study, choice)
-            run_live(gone_on_with(replace(choice, seed=request.seed, results=results)), band=band, last=last)
-        except RunStopped as stop:
-            return _stopped(choice, str(stop))
-        except RecoilError as error:
-            return str(error)
+        if choice.training:
+            results = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            choice = replace(choice, results=results, sensor="", markers=False)
+        if choice.markers:
+            beside = markers(choice.results, said.append)
+            while_shown("Starting the markers …", lambda: stack.enter_context(beside))
+        went_wrong = WITHOUT_MARKERS if said else _carried_out(replace(choice, seed=request.seed), study)
+    return "\n".join(filter(None, (*said, went_wrong)))
+
+
+WITHOUT_MARKERS = f"The run was not begun: mend that, or untick “{SENDS_MARKERS}”."
+
+
+def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
+    try:
+        band, last = _band_and_last(study, choice)
+        run_live(gone_on_with(choice), band=band, last=last)
+    except RunStopped as stop:
+        return _stopped(choice, str(stop))
+    except RecoilError as error:
+        return str(error)
     return ""
 
 

@@ -274,6 +274,8 @@ class StartWindow(QtWidgets.QWidget):
                 training=training,
                 screen="console",
                 options=self.form.options(),
+                sensor=self.form.sensor.text().strip(),
+                markers=self.form.markers.isChecked(),
                 language=self.form.language,
             )
             self.close()
