@@ -43,7 +43,7 @@ _SLAVED = 0.01  # the current follows the motion if L/R is at most this part of 
 def motion_rate(p: Constants, s: ShotState) -> float:
     """How fast the motion itself changes, in 1/s: braking by the back-EMF, the force's fading along x, the spring."""
     current = abs(s.u) / p.resistance + abs(s.i)
-    braking = p.back_emf * p.motor_constant / (p.mass * p.resistance)
+    braking = braking_rate(p, grip(p, s.x))
     fading = math.sqrt(p.motor_constant * current / (p.coil_reach * p.mass)) + abs(s.v) / p.coil_reach
     return braking + fading + math.sqrt(p.stiffness / p.mass)
 
