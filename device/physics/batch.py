@@ -80,7 +80,17 @@ _ONCE = frozenset(["shoot", "shoot_on", "advance", "coil_step"])
 """Each called in one place, and holding nearly all code: copied in before machine code is made of them, which else is
 made, and made fast, of all that code at each of these levels: half of the compiler's time."""
 _SELDOM = frozenset(
-    ["bernstein_over", "halve", "first_crossing", "peak_force", "expand_creeping", "expand_slaved", "powered_arc"]
+    [
+        "bernstein_over",
+        "halve",
+        "first_crossing",
+        "peak_force",
+        "expand_creeping",
+        "expand_slaved",
+        "pass_of_both",
+        "pass_of_current",
+        "powered_arc",
+    ]
 )
 """Called seldom or from many places, and long: the compiler may leave them where they are."""
 

@@ -163,7 +163,7 @@ def finish_step(p: Constants, s: ShotState, w: StepSeries, span: float, event: i
     at = first_arrival(p, w, s.heading)
     if at <= used:
         used, event = at, COIL_EDGE if s.heading > 0.0 else STOP
-    if s.heading > 0.0 and w.i[0] > 0.0 and w.i[0] + lower_bound(w.i, 1.0) <= 0.0:
+    if s.recoiling and s.heading > 0.0 and w.i[0] > 0.0 and w.i[0] + lower_bound(w.i, 1.0) <= 0.0:
         for n in range(ORDER + 1):
             w.other[n] = w.i[n]
         at = first_crossing(w)
@@ -207,6 +207,7 @@ def land(p: Constants, s: ShotState, w: StepSeries, used: float, event: int) -> 
         s.x, s.v, s.i = value_at_end(w.x), value_at_end(w.v), value_at_end(w.i)
         return
     s.x, s.v, s.i = value_at(w.x, used), value_at(w.v, used), value_at(w.i, used)
+    s.recoiling = s.recoiling and s.heading < 0.0  # what ends a way out in the coil ends the recoil stage
     if event == TURN:
         s.v = 0.0
     elif event == COIL_EDGE:

@@ -98,6 +98,7 @@ class ShotState:
     u: float = 0.0  # the drive's voltage
     live: bool = False  # whether current can flow
     drive_until: float = 0.0
+    recoiling: bool = True  # whether the end of the recoil stage may still come
     guess: float = 0.0  # of the span of the next step in the coil
     span: float = 0.0  # of the last one
     used: float = 0.0  # how much of it, before its event
@@ -118,7 +119,6 @@ class StepSeries:
     x: list[float] = field(default_factory=_zeros)
     v: list[float] = field(default_factory=_zeros)
     i: list[float] = field(default_factory=_zeros)
-    grip: list[float] = field(default_factory=_zeros)
     other: list[float] = field(default_factory=_zeros)  # whose roots are looked for
     bernstein: list[float] = field(default_factory=_zeros)
     beyond: list[float] = field(default_factory=_zeros)  # the other half of an interval

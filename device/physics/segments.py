@@ -132,7 +132,7 @@ def free_current(p: Constants, u: float, i: float, v: float, a: float, t: float)
 
 def pulse_on(p: Constants, s: ShotState) -> None:
     """The drive from the onset of a pulse at time 0 on."""
-    s.time, s.u, s.live, s.drive_until = 0.0, p.voltage, True, min(p.pulse_s, s.until)
+    s.time, s.u, s.live, s.drive_until, s.recoiling = 0.0, p.voltage, True, min(p.pulse_s, s.until), True
     if p.pulse_s <= 0.0:
         pulse_off(p, s)
 

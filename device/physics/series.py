@@ -21,44 +21,97 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from device.physics.equations import ORDER, Coefficients, Constants, ShotState, StepSeries, friction
 from device.physics.polynomial import from_text
 
 Expand = Callable[[Constants, float, float, float, StepSeries], None]
+Pass = Callable[[Constants, float, float, float, StepSeries], float]
+"""Functions of (constants, drive in V, push in N, span in s, series), the first coefficients in the series. The push
+is what friction and the spring's pre-load give at x = 0. A pass gives back how much changed, relative to its size."""
 
 
-def written_out(name: str, *, reciprocal: bool) -> Expand:
-    """A function of (constants, drive in V, push in N, span in s, series), the first coefficients in the series.
+def _written_out(name: str, lines: list[str]) -> Any:
+    """A function with these lines, between what all have in common."""
+    head = [
+        f"def {name}(p, u, push, h, w):",
+        "per_reach, per_mass = 1.0 / p.coil_reach, h / p.mass",
+        "k, motor, emf, R = p.stiffness, p.motor_constant, p.back_emf, p.resistance",
+        "x, v, i, x0 = w.x, w.v, w.i, w.x[0]",
+        "g0 = (p.coil_reach - x0) * per_reach",
+    ]
+    return from_text(name, "\n    ".join([*head, *lines]))
 
-    The push is what friction and the spring's pre-load give at x = 0.
-    """
-    expand: Expand = from_text(name, "\n".join([_head(name), *(_step(n, reciprocal) for n in range(ORDER))]))
+
+def _expansion(name: str, *, reciprocal: bool) -> Expand:
+    """The series from their first coefficients."""
+    lines = ["per_inductance, v0, i0 = h / p.inductance, v[0], i[0]"]
+    for n in range(ORDER):
+        seen = f"({_product('g', 'v', n)})" if reciprocal else f"v{n}"
+        current = f"({_first(n, 'u ')}- R * i{n} - emf * {seen}) * per_inductance * {1.0 / (n + 1)!r}"
+        lines += [*_position(n), _speed(n), f"i{n + 1} = i[{n + 1}] = {current}"]
+    expand: Expand = _written_out(name, lines)
     return expand
 
 
-def _head(name: str) -> str:
-    return f"""
-def {name}(p, u, push, h, w):
-    per_reach, per_mass, per_inductance = 1.0 / p.coil_reach, h / p.mass, h / p.inductance
-    k, motor, emf, R = p.stiffness, p.motor_constant, p.back_emf, p.resistance
-    x, v, i, g = w.x, w.v, w.i, w.grip
-    x0, v0, i0 = x[0], v[0], i[0]
-    g0 = (p.coil_reach - x0) * per_reach
-    g[0] = g0"""
+def _pass_of_current() -> Pass:
+    """One pass of the series whose current follows the motion."""
+    lines = ["lag, v0, reciprocal = p.inductance / h, v[0], p.reciprocal"]
+    for n in range(ORDER + 1):
+        seen = f"(({_product('g', 'v', n)}) if reciprocal else v{n})"
+        lines.append(f"i{n} = ({_first(n, 'u ')}{_later('- lag', 'i', n)} - emf * {seen}) / R")
+        lines += [_changed("i", n), *([*_position(n), _speed(n)] if n < ORDER else [])]
+    one: Pass = _written_out("pass_of_current", [*lines, f"return {_largest('di')} / ({_largest('i')} + 1e-300)"])
+    return one
 
 
-def _step(n: int, reciprocal: bool) -> str:
-    """The coefficients n + 1 from those before."""
-    after, part = n + 1, repr(1.0 / (n + 1))
-    seen = f"({_product('g', 'v', n)})" if reciprocal else f"v{n}"
-    push, drive = (" + push", "u ") if n == 0 else ("", "")
-    return f"""
-    x{after} = h * v{n} * {part}
-    g{after} = -x{after} * per_reach
-    v{after} = (motor * ({_product("g", "i", n)}) - k * x{n}{push}) * per_mass * {part}
-    i{after} = ({drive}- R * i{n} - emf * {seen}) * per_inductance * {part}
-    x[{after}], v[{after}], i[{after}], g[{after}] = x{after}, v{after}, i{after}, g{after}"""
+def _pass_of_both() -> Pass:
+    """One pass of the series whose current and speed follow the position."""
+    lines = ["lag, inertia, reciprocal = p.inductance / h, p.mass / h, p.reciprocal"]
+    for n in range(ORDER + 1):
+        force = f"k * x{n}{_first(n, ' - push')}{_later(' + inertia', 'v', n)}"
+        lines.append(f"i{n} = (({force}) / motor - ({_product_before('i', n)})) / g0")
+        lines.append(f"v{n} = ({_first(n, 'u ')}{_later('- lag', 'i', n)} - R * i{n}) / emf")
+        lines.append(f"if reciprocal: v{n} = (v{n} - ({_product_before('v', n)})) / g0")
+        lines += [_changed("i", n), _changed("v", n), *(_position(n) if n < ORDER else [])]
+    lines += [
+        "least = k * (p.preload + abs(x0)) / motor",  # what may cancel in a force
+        f"i_change = {_largest('di')} / (max(least, {_largest('i')}) + 1e-300)",
+        f"v_change = {_largest('dv')} / (max(R * least / emf, {_largest('v')}) + 1e-300)",
+        "return max(i_change, v_change)",
+    ]
+    one: Pass = _written_out("pass_of_both", lines)
+    return one
+
+
+def _position(n: int) -> list[str]:
+    """The coefficients n + 1 of the position and of the coil's hold."""
+    return [f"x{n + 1} = x[{n + 1}] = h * v{n} * {1.0 / (n + 1)!r}", f"g{n + 1} = -x{n + 1} * per_reach"]
+
+
+def _speed(n: int) -> str:
+    """The coefficient n + 1 of the speed, from the forces."""
+    force = f"motor * ({_product('g', 'i', n)}) - k * x{n}{_first(n, ' + push')}"
+    return f"v{n + 1} = v[{n + 1}] = ({force}) * per_mass * {1.0 / (n + 1)!r}"
+
+
+def _first(n: int, what: str) -> str:
+    """What is constant over the step."""
+    return what if n == 0 else ""
+
+
+def _later(what: str, c: str, n: int) -> str:
+    """The n-th coefficient of a derivative, of the pass before this one."""
+    return f"{what} * {n + 1}.0 * {c}[{n + 1}]" if n < ORDER else ""
+
+
+def _changed(c: str, n: int) -> str:
+    return f"d{c}{n}, {c}[{n}] = {c}{n} - {c}[{n}], {c}{n}"
+
+
+def _largest(c: str) -> str:
+    return f"max({', '.join(f'abs({c}{n})' for n in range(ORDER + 1))})"
 
 
 def _product(a: str, b: str, n: int) -> str:
@@ -69,8 +122,15 @@ def _product(a: str, b: str, n: int) -> str:
     return " + ".join([*middle, *pairs])
 
 
-expand_printed = written_out("expand_printed", reciprocal=False)
-expand_reciprocal = written_out("expand_reciprocal", reciprocal=True)
+def _product_before(b: str, n: int) -> str:
+    """The same of the coil's hold and a series whose own n-th coefficient is still to come."""
+    return " + ".join(f"g{n - j} * {b}{j}" for j in range(n)) or "0.0"
+
+
+expand_printed = _expansion("expand_printed", reciprocal=False)
+expand_reciprocal = _expansion("expand_reciprocal", reciprocal=True)
+pass_of_current = _pass_of_current()
+pass_of_both = _pass_of_both()
 
 TOLERANCE = 2e-12
 """Of the first coefficient left out, relative to the largest of the leading ones."""
@@ -78,16 +138,6 @@ _LONGEST = 3.0  # how far past its scale a series may reach
 _NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
 _PASSES = 16  # the n-th adds about n! (L/R or the like, over the motion's own time)^n
 _SETTLED = 4e-16  # relative
-_PER = (0.0, *(1.0 / n for n in range(1, ORDER + 2)))
-
-
-def product(a: Coefficients, b: Coefficients, n: int) -> float:
-    """The n-th coefficient of a product of series: two terms at a time, first those that were known first."""
-    half = (n + 1) // 2
-    total = a[half] * b[half] if n % 2 == 0 else 0.0
-    for j in range(half - 1, -1, -1):
-        total += a[n - j] * b[j] + a[j] * b[n - j]
-    return total
 
 
 def expand(p: Constants, u: float, heading: float, span: float, w: StepSeries) -> None:
@@ -118,28 +168,9 @@ def clear(c: list[float]) -> None:
 
 
 def follow(p: Constants, u: float, heading: float, span: float, w: StepSeries) -> float:
-    """One pass: x, v, g and the current; how much the current changed, relative to its size."""
-    push, lag = friction(p, heading) - p.stiffness * p.preload, p.inductance / span
+    """One pass: x, v and the current; how much the current changed, relative to its size."""
     w.work += 1
-    change, size = 0.0, 1e-300
-    w.grip[0] = (p.coil_reach - w.x[0]) / p.coil_reach
-    for n in range(ORDER + 1):
-        delay = lag * (n + 1) * w.i[n + 1] if n < ORDER else 0.0
-        i = (u - delay - p.back_emf * seen_speed(p, w, n)) / p.resistance
-        change, size = max(change, abs(i - w.i[n])), max(size, abs(i))
-        w.i[n] = i
-        if n < ORDER:
-            w.x[n + 1] = span * w.v[n] * _PER[n + 1]
-            w.grip[n + 1] = -w.x[n + 1] / p.coil_reach
-            force = p.motor_constant * product(w.grip, w.i, n) - p.stiffness * w.x[n] + push
-            w.v[n + 1] = force * span / p.mass * _PER[n + 1]
-        push, u = 0.0, 0.0
-    return change / size
-
-
-def seen_speed(p: Constants, w: StepSeries, n: int) -> float:
-    """The n-th coefficient of the speed that the back-EMF sees."""
-    return product(w.grip, w.v, n) if p.reciprocal else w.v[n]
+    return pass_of_current(p, u, friction(p, heading) - p.stiffness * p.preload, span, w)
 
 
 def expand_creeping(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
@@ -161,28 +192,9 @@ def expand_creeping(p: Constants, s: ShotState, span: float, w: StepSeries) -> f
 
 
 def creep(p: Constants, u: float, heading: float, span: float, w: StepSeries) -> float:
-    """One pass: x, g, v and i; how much v and i changed, relative to their size."""
-    push, lag, inertia = friction(p, heading) - p.stiffness * p.preload, p.inductance / span, p.mass / span
-    i_size = p.stiffness * (p.preload + abs(w.x[0])) / p.motor_constant  # what may cancel in a force
-    v_size = p.resistance * i_size / p.back_emf
-    v_change, i_change = 0.0, 0.0
+    """One pass: x, v and i; how much v and i changed, relative to their size."""
     w.work += 1
-    w.grip[0] = (p.coil_reach - w.x[0]) / p.coil_reach
-    for n in range(ORDER + 1):
-        v, i, later = w.v[n], w.i[n], n + 1 if n < ORDER else 0
-        delay = lag * later * w.i[later]
-        w.v[n], w.i[n] = 0.0, 0.0
-        held = p.stiffness * w.x[n] - push + inertia * later * w.v[later]
-        w.i[n] = (held / p.motor_constant - product(w.grip, w.i, n)) / w.grip[0]
-        seen = (u - delay - p.resistance * w.i[n]) / p.back_emf
-        w.v[n] = (seen - product(w.grip, w.v, n)) / w.grip[0] if p.reciprocal else seen
-        v_change, v_size = max(v_change, abs(w.v[n] - v)), max(v_size, abs(w.v[n]))
-        i_change, i_size = max(i_change, abs(w.i[n] - i)), max(i_size, abs(w.i[n]))
-        if n < ORDER:
-            w.x[n + 1] = span * w.v[n] * _PER[n + 1]
-            w.grip[n + 1] = -w.x[n + 1] / p.coil_reach
-        push, u = 0.0, 0.0
-    return max(v_change / (v_size + 1e-300), i_change / (i_size + 1e-300))
+    return pass_of_both(p, u, friction(p, heading) - p.stiffness * p.preload, span, w)
 
 
 def leading(c: Coefficients, floor: float) -> float:
