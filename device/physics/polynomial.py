@@ -25,15 +25,6 @@ def value_at(c: Coefficients, s: float) -> float:
     return (even * q + odd * s) + c[0]
 
 
-def value_at_end(c: Coefficients) -> float:
-    """The polynomial of even order at s = 1, the small coefficients first."""
-    even, odd = 0.0, 0.0
-    for j in range(ORDER, 0, -2):
-        even += c[j]
-        odd += c[j - 1]
-    return even + odd + c[0]
-
-
 def lower_bound(c: Coefficients, sign: float) -> float:
     """A bound from below for what the polynomial, times `sign`, adds to its first coefficient on [0, 1]."""
     even, odd = 0.0, 0.0
@@ -80,6 +71,19 @@ to_bernstein = _of_series("to_bernstein", _to_bernstein())
 """The Bernstein coefficients over [0, 1] of the polynomial in `other`."""
 halve = _of_series("halve", _halve())
 """Those over the first half of their interval in place of those over all of it; the second half's go `beyond`."""
+
+
+def _value_at_end() -> Callable[[Coefficients], float]:
+    """The small coefficients first."""
+    even, odd = (" + ".join(f"c[{j}]" for j in range(last, 0, -2)) for last in (ORDER, ORDER - 1))
+    function: Callable[[Coefficients], float] = from_text(
+        "value_at_end", f"def value_at_end(c):\n    return {even} + ({odd}) + c[0]"
+    )
+    return function
+
+
+value_at_end = _value_at_end()
+"""The polynomial of even order at s = 1."""
 
 
 def restrict(w: StepSeries, low: float, high: float) -> None:

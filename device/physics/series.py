@@ -135,6 +135,7 @@ pass_of_both = _pass_of_both()
 TOLERANCE = 2e-12
 """Of the first coefficient left out, relative to the largest of the leading ones."""
 _LONGEST = 3.0  # how far past its scale a series may reach
+_NEAR = 0.02  # a span this near is as good: it multiplies what is left out by at most 1.02^24
 _NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
 _PASSES = 16  # the n-th adds about n! (L/R or the like, over the motion's own time)^n
 _SETTLED = 4e-16  # relative
@@ -211,14 +212,16 @@ def radius(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
     v_size = leading(w.v, 0.0 if s.creeping else 1e-6 * held / p.mass * span)
     x_size = leading(w.x, v_size * span)
     i_size = leading(w.i, 1e-2 * (abs(s.u) + p.back_emf * abs(w.v[0])) / p.resistance)
-    last = max(size_ratio(w.x[ORDER], x_size), size_ratio(w.v[ORDER], v_size), size_ratio(w.i[ORDER], i_size))
-    other = max(
-        size_ratio(w.x[ORDER - 1], x_size), size_ratio(w.v[ORDER - 1], v_size), size_ratio(w.i[ORDER - 1], i_size)
-    )
-    last = max(last, other)
+    last = max(size_ratio(last_of(w.x), x_size), size_ratio(last_of(w.v), v_size), size_ratio(last_of(w.i), i_size))
     if last <= _NEGLIGIBLE:
         return _LONGEST
     return min(_LONGEST, (TOLERANCE / last) ** (1.0 / ORDER)) if last < math.inf else 0.0
+
+
+def last_of(c: Coefficients) -> float:
+    """The size of the last two coefficients."""
+    last, other = abs(c[ORDER]), abs(c[ORDER - 1])
+    return other if other > last else last
 
 
 def size_ratio(a: float, b: float) -> float:
@@ -250,6 +253,8 @@ def fitted_span(p: Constants, s: ShotState, span: float, w: StepSeries) -> float
         factor = radius(p, s, span, w)
         if factor <= 0.0:
             return 0.0
+        if abs(factor - 1.0) <= _NEAR:
+            break
         rescale(w, factor)
         span *= factor
         if factor > 0.5:
