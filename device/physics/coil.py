@@ -37,7 +37,8 @@ from device.physics.series import (
 )
 
 _TRANSIENT = 40.0  # time constants of the current, after which exp(-40) of it is left
-_SLAVED = 0.01  # the current follows the motion if L/R is at most this part of the motion's own time
+_TRY_AGAIN = 400.0  # the same, until the next look at series that did not settle: some forty plain steps
+_SLAVED = 0.02  # the current follows the motion if L/R is at most this part of the motion's own time
 
 
 def motion_rate(p: Constants, s: ShotState) -> float:
@@ -53,6 +54,16 @@ def is_slaved(p: Constants, s: ShotState) -> bool:
     if s.time < s.transient_until:
         return False
     return motion_rate(p, s) * p.inductance / p.resistance <= _SLAVED
+
+
+def try_to_follow(p: Constants, s: ShotState, w: StepSeries) -> bool:
+    """The series whose current follows the motion, if it does; if they do not settle, when to look again."""
+    if not is_slaved(p, s):
+        return False
+    settled = expand_slaved(p, s.u, s.heading, s.guess, w)
+    if not settled:
+        s.transient_until = s.time + _TRY_AGAIN * p.inductance / p.resistance
+    return settled
 
 
 def begin_coil(p: Constants, s: ShotState) -> None:
@@ -140,7 +151,7 @@ def coil_step(p: Constants, s: ShotState, w: StepSeries) -> int:
         if p.inductance == 0.0:
             clear(w.i)
             follow(p, u, s.heading, s.guess, w)
-        elif not (is_slaved(p, s) and expand_slaved(p, u, s.heading, s.guess, w)):
+        elif not try_to_follow(p, s, w):
             w.i[0] = s.i
             expand(p, u, s.heading, s.guess, w)
     span = fitted_span(p, s, s.guess, w)
