@@ -39,9 +39,20 @@ def lower_bound(c: Coefficients, sign: float) -> float:
 
 def _to_bernstein() -> list[str]:
     """b_j = sum over k <= j of C(j, k)/C(n, k) c_k."""
-    scaled = [f"b{k} = c[{k}] * {1.0 / math.comb(ORDER, k)!r}" for k in range(ORDER + 1)]
+    return ["c = w.other", *(f"c{k} = c[{k}]" for k in range(ORDER + 1)), *_summed()]
+
+
+def _to_bernstein_over() -> list[str]:
+    """The same of the polynomial in (s - low)/width: shifted by Horner's scheme, then scaled."""
+    shifted = [f"c{k} += low * c{k + 1}" for first in range(ORDER) for k in range(ORDER - 1, first - 1, -1)]
+    scaled = [line for k in range(1, ORDER + 1) for line in (f"c{k} *= power", "power *= width")]
+    return ["c, power = w.other, width", *(f"c{k} = c[{k}]" for k in range(ORDER + 1)), *shifted, *scaled, *_summed()]
+
+
+def _summed() -> list[str]:
+    scaled = [f"b{k} = c{k} * {1.0 / math.comb(ORDER, k)!r}" for k in range(ORDER + 1)]
     summed = [f"b{j} += b{j - 1}" for low in range(1, ORDER + 1) for j in range(ORDER, low - 1, -1)]
-    return ["b, c = w.bernstein, w.other", *scaled, *summed]
+    return ["b = w.bernstein", *scaled, *summed]
 
 
 def _halve() -> list[str]:
@@ -60,16 +71,19 @@ def from_text(name: str, text: str) -> Any:
     return space[name]
 
 
-def _of_series(name: str, lines: list[str]) -> Callable[[StepSeries], None]:
+def _of_series(name: str, arguments: str, lines: list[str]) -> Any:
     """A function of the series that leaves b in their `bernstein`."""
     stored = (f"b[{j}] = b{j}" for j in range(ORDER + 1))
-    function: Callable[[StepSeries], None] = from_text(name, "\n    ".join([f"def {name}(w):", *lines, *stored]))
-    return function
+    return from_text(name, "\n    ".join([f"def {name}({arguments}):", *lines, *stored]))
 
 
-to_bernstein = _of_series("to_bernstein", _to_bernstein())
+to_bernstein: Callable[[StepSeries], None] = _of_series("to_bernstein", "w", _to_bernstein())
 """The Bernstein coefficients over [0, 1] of the polynomial in `other`."""
-halve = _of_series("halve", _halve())
+to_bernstein_over: Callable[[StepSeries, float, float], None] = _of_series(
+    "to_bernstein_over", "w, low, width", _to_bernstein_over()
+)
+"""The same over [low, low + width]."""
+halve: Callable[[StepSeries], None] = _of_series("halve", "w", _halve())
 """Those over the first half of their interval in place of those over all of it; the second half's go `beyond`."""
 
 
@@ -86,24 +100,13 @@ value_at_end = _value_at_end()
 """The polynomial of even order at s = 1."""
 
 
-def restrict(w: StepSeries, low: float, high: float) -> None:
-    """The Bernstein coefficients over [low, high] in place of those over [0, 1] (de Casteljau, twice)."""
-    b = w.bernstein
-    for r in range(1, ORDER + 1):
-        for j in range(ORDER, r - 1, -1):
-            b[j] = (1.0 - high) * b[j - 1] + high * b[j]
-    t = low / high
-    for r in range(1, ORDER + 1):
-        for j in range(ORDER + 1 - r):
-            b[j] = (1.0 - t) * b[j] + t * b[j + 1]
-
-
 def bernstein_over(w: StepSeries, low: float, high: float) -> None:
     """The Bernstein coefficients over [low, high] of the polynomial in `other`."""
     w.work += 1
-    to_bernstein(w)
     if low > 0.0 or high < 1.0:
-        restrict(w, low, high)
+        to_bernstein_over(w, low, high - low)
+    else:
+        to_bernstein(w)
 
 
 def sign_changes(b: Coefficients) -> int:
