@@ -157,11 +157,11 @@ def enter(p: Constants, s: ShotState, event: int) -> None:
     """What the last event does to the state, and the segment that follows.
 
     The inelastic stop takes the velocity, an open drive the current. A magnet that set out and got nowhere, a hop
-    below what floats resolve, rests.
+    below what floats resolve, rests until the current lets it go; without one, the spring does so at once.
     """
     if event == CONTINUES:
         return
-    halted = s.heading != 0.0 and s.time == s.began
+    halted = s.live and s.heading != 0.0 and s.time == s.began
     if event == STOP:
         s.v = 0.0
     if not s.live:
