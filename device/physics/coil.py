@@ -68,7 +68,7 @@ def try_to_follow(p: Constants, s: ShotState, w: StepSeries) -> bool:
 
 def begin_coil(p: Constants, s: ShotState) -> None:
     """A first guess at the step, when the current's transient will be over, and when to look whether it creeps."""
-    s.creeping, s.creeping_from = False, s.time + how_long(_FADED, fading_rate(p, 1.0))
+    s.creeping, s.creeping_from = False, s.time + until_next_look(p, 1.0)
     if p.inductance == 0.0:
         s.guess = 2.0 / motion_rate(p, s)
         return
@@ -100,45 +100,75 @@ def fading_rate(p: Constants, hold: float) -> float:
     return 2.0 * braking / (1.0 + math.sqrt(spare)) if spare > 0.0 else 0.5 * rate
 
 
+def settling_rate(p: Constants, hold: float) -> float:
+    """How fast what fades goes on meanwhile, in 1/s: above the rate of its fading where speed and current ring."""
+    braking = braking_rate(p, hold)
+    rings = p.inductance > 0.0 and 4.0 * braking * p.inductance > p.resistance
+    return math.sqrt(braking * p.resistance / p.inductance) if rings else fading_rate(p, hold)
+
+
 def creeping_rate(p: Constants, s: ShotState, hold: float) -> float:
     """How fast the position itself changes then, in 1/s."""
     stiffness = p.stiffness + p.motor_constant * abs(s.i) / p.coil_reach
     return stiffness / (p.mass * braking_rate(p, hold)) + abs(s.v) / (hold * p.coil_reach)
 
 
-_CREEPING = 0.02  # the magnet creeps if its position changes at most at this part of the rate at which the rest fades
-_FADED = 10.0  # time constants of what fades, before which nothing is looked at
-_LOOK_AGAIN = 3.0  # time constants until the next look
+_CREEPING = 0.02  # the magnet creeps if its position changes at most at this part of the rate at which the rest settles
+_LOOK_AGAIN = 20.0  # rings, in radians, or time constants besides the one of what fades, until the next look
 _APART = 1e-12  # relative: closer than this, speed and current are those that follow the position
+_FARTHEST = 0.01  # relative: farther apart, what is apart is no small part
+
+
+def until_next_look(p: Constants, hold: float) -> float:
+    """How many seconds it is worth waiting before looking whether the magnet creeps; infinite if it never does."""
+    fading = fading_rate(p, hold)
+    return 1.0 / fading + _LOOK_AGAIN / settling_rate(p, hold) if fading > 0.0 else math.inf
 
 
 def try_to_creep(p: Constants, s: ShotState, w: StepSeries) -> None:
     """The series of a creeping magnet, if it creeps; if it does not yet, when to look again."""
     going, s.creeping, hold = s.creeping, False, grip(p, s.x)
-    fading = fading_rate(p, hold)
-    if fading > 0.0 and creeping_rate(p, s, hold) <= _CREEPING * fading:
+    settling = settling_rate(p, hold)
+    if settling > 0.0 and creeping_rate(p, s, hold) <= _CREEPING * settling:
         rate = creeping_rate(p, s, hold)
         s.creeping, w.x[0] = True, s.x
         span = expand_creeping(p, s, s.guess if going else 1.0 / (rate + 1.0 / HORIZON_S), w)
-        s.creeping = span > 0.0 and (going or has_come_to_creep(p, s, w, fading, rate))
+        if span > 0.0 and not going:
+            span = span_from_where_it_goes(p, s, w, span) if has_come_to_creep(p, s, w, rate) else 0.0
+        s.creeping = span > 0.0
         if s.creeping:
             s.guess = span
         else:
-            s.creeping_from = s.time + _LOOK_AGAIN / fading
+            s.creeping_from = s.time + until_next_look(p, hold)
     if going and not s.creeping:
         begin_coil(p, s)
 
 
-def has_come_to_creep(p: Constants, s: ShotState, w: StepSeries, fading: float, rate: float) -> bool:
+def has_come_to_creep(p: Constants, s: ShotState, w: StepSeries, rate: float) -> bool:
     """Whether it matters no longer how far speed and current are apart from those that follow the position.
 
-    What is apart fades while it shifts the position, and must be gone when the magnet arrives or the drive changes.
+    What is apart fades, and must be gone when the magnet arrives or the drive changes. It also shifts the position,
+    which is known but for what the position itself changes meanwhile.
     """
-    apart = max(size_ratio(w.v[0] - s.v, abs(w.v[0])), size_ratio(w.i[0] - s.i, abs(w.i[0]))) / _APART
-    ahead = s.x if s.heading < 0.0 else p.coil_reach - s.x
-    soonest = min(how_long(ahead, abs(s.v)), s.drive_until - s.time)
+    apart = max(size_ratio(w.v[0] - s.v, abs(w.v[0])), size_ratio(w.i[0] - s.i, abs(w.i[0])))
+    ahead, hold = s.x if s.heading < 0.0 else p.coil_reach - s.x, grip(p, s.x)
+    changes = s.drive_until - s.time if s.drive_until < HORIZON_S else math.inf  # nobody asks how it moves at the end
+    soonest = min(how_long(ahead, abs(s.v)), changes)
     slowest = min(how_long(min(s.x, ahead), abs(s.v)), how_long(1.0, rate))
-    return apart <= fading * slowest and apart <= math.exp(min(fading * soonest, 20.0))
+    times, products = settling_rate(p, hold) * slowest, braking_rate(p, hold) * slowest
+    gone = apart <= _APART * math.exp(min(fading_rate(p, hold) * soonest, 30.0))
+    return gone and apart <= min(0.1 * _APART * times * times, math.sqrt(_APART * products), _FARTHEST)
+
+
+def span_from_where_it_goes(p: Constants, s: ShotState, w: StepSeries, span: float) -> float:
+    """The series from the position that the magnet goes on from once all has faded; their span, 0 if there is none.
+
+    L di' = -R di - k_e dv and m dv' = k_m g di, integrated over what is apart, say how far it still carries the magnet.
+    """
+    pull, seen = p.motor_constant * grip(p, s.x), p.back_emf * (grip(p, s.x) if p.reciprocal else 1.0)
+    apart_v, apart_i = s.v - w.v[0], s.i - w.i[0]
+    w.x[0] = s.x + (p.inductance * apart_i + p.resistance * p.mass * apart_v / pull) / seen
+    return expand_creeping(p, s, span, w)
 
 
 def coil_step(p: Constants, s: ShotState, w: StepSeries) -> int:
