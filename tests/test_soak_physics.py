@@ -163,8 +163,8 @@ def test_extremes(soak: Soak) -> None:
     assert slowest < 8
 
 
-@pytest.mark.parametrize(("decades", "count"), [(3, 3000), (12, 300)])
-def test_work_far_from_the_papers_gun(decades: int, count: int, soak: Soak) -> None:
+@pytest.mark.parametrize(("decades", "count", "bound_ms"), [(3, 3000, 50), (12, 300, 1000)])
+def test_work_far_from_the_papers_gun(decades: int, count: int, bound_ms: int, soak: Soak) -> None:
     rng, seconds, works, counts = np.random.default_rng(1), list[float](), list[int](), Counter[str]()
     for _ in range(count):
         options = dict(zip(("drive_off", "emf"), VARIANTS[rng.integers(len(VARIANTS))], strict=True))
@@ -176,12 +176,12 @@ def test_work_far_from_the_papers_gun(decades: int, count: int, soak: Soak) -> N
         works.append(series.work)
         counts[STATUSES[result.status]] += 1
     middle, late, last = (1e3 * np.quantile(seconds, part) for part in (0.5, 0.99, 1.0))
-    over = sum(second > 0.05 for second in seconds)
+    over = sum(1e3 * second > bound_ms for second in seconds)
     each = ", ".join(f"{number} {name}" for name, number in counts.most_common())
     soak(
         f"interpreted, guns of {decades} decades about the paper's: CPU time a shot",
-        f"median {middle:.1f} ms, 99 of 100 below {late:.0f} ms, longest {last:.0f} ms; {over} of {count:,} over 50 ms",
-        "50 ms of 3 decades, 1 s of 12",
+        f"median {middle:.1f} ms, 99 of 100 below {late:.0f} ms, longest {last:.0f} ms; {over} of {count:,} longer",
+        f"{bound_ms} ms",
         f"most work {max(works):,} of {MAX_WORK:,}; {each}",
     )
     assert max(works) < MAX_WORK + 2000  # what one segment may add

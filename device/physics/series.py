@@ -221,7 +221,7 @@ def radius(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
 def last_of(c: Coefficients) -> float:
     """The size of the last two coefficients."""
     last, other = abs(c[ORDER]), abs(c[ORDER - 1])
-    return other if other > last else last
+    return max(last, other)
 
 
 def size_ratio(a: float, b: float) -> float:
