@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from analysis.predict.design_search.choice import THRESHOLD_SHARE, rate_at
-from analysis.predict.jobs import cores
+from analysis.report.copies import cores
 from device.parameters import GunParameters
 from device.physics.shot import highest_rate_Hz
 from experiments.synthetic.percept import PerceptParameters

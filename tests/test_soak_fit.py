@@ -16,8 +16,9 @@ import pytest
 
 from analysis.paper.recurrence import wilson_interval
 from analysis.predict.fit.percept_model import FITTED, Fitted, fit_percept
-from analysis.predict.jobs import cores, on_processes
+from analysis.predict.jobs import on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR
+from analysis.report.copies import cores
 from device.methods import paper_methods
 from experiments.design.streams import generator
 from experiments.load import load_setup

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from analysis.predict.jobs import cores
+from analysis.report.copies import cores
 from device.physics import (
     FIDELITIES,
     GunParameters,

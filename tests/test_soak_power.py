@@ -18,9 +18,10 @@ import pytest
 from analysis.paper.paper import load_paper
 from analysis.paper.recurrence import WHOLE_PATTERN, wilson_interval
 from analysis.predict.drawn import studies_of
-from analysis.predict.jobs import cores, on_processes
+from analysis.predict.jobs import on_processes
 from analysis.predict.power.planned import ANOVA, ANY_PAIR
 from analysis.predict.synthetic_studies import pattern_odds
+from analysis.report.copies import cores
 from experiments.load import find, load_setup
 from tests.conftest import RECOIL, Soak
 from tests.power_chain import counted, null_setup, said, through_the_chain

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.predict.jobs import cores
+from analysis.report.copies import cores
 from tests.conftest import RECOIL, Soak
 from tests.power_files import files
 from tests.waiting import wait_for

@@ -21,6 +21,7 @@ from functools import partial
 from multiprocessing import get_context, parent_process
 from typing import Any
 
+from analysis.report.copies import no_interrupt
 from experiments.config.door import ConfigError
 from experiments.record.provenance import recoil_version, versions
 
@@ -32,15 +33,9 @@ RunPieces = Callable[[Function, Sequence[Any], Done], None]
 
 CONNECT_S = 10
 """How long to wait for a cluster, and for its first worker; assumed."""
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _ADDRESS = r"(?:(?:tcp|tls|ws|wss)://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]{1,5}"
 _SAME = ("recoil", "numpy", "scipy")
 """What workers must have in the versions of this machine, lest their numbers differ."""
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -68,7 +63,7 @@ def _on_processes(workers: int, function: Function, pieces: Sequence[Any], done:
         return
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
     try:
-        with _no_interrupt():
+        with no_interrupt():
             numbers = {pool.submit(function, piece): number for number, piece in enumerate(pieces)}
         for future in as_completed(numbers):
             done(numbers[future], future.result())
@@ -89,32 +84,6 @@ def _on_cluster(client: Any, function: Function, pieces: Sequence[Any], done: Do
             done(numbers[future.key], _result(future))
     finally:
         client.cancel(futures)
-
-
-@contextmanager
-def _no_interrupt() -> Iterator[None]:
-    """Starting processes is not cut in half by a signal: it is told afterwards. They themselves never hear a Ctrl-C.
-
-    They inherit the mask of this thread; another thread may still take the signal, so the handlers wait as well.
-    """
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    heard: list[int] = []
-
-    def hear(number: int, _: object) -> None:
-        heard.append(number)
-
-    handlers = {number: signal.signal(number, hear) for number in _SIGNALS}
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        if heard:
-            signal.raise_signal(heard[0])
 
 
 def _begin_worker() -> None:

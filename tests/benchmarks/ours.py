@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.predict.jobs import cores
+from analysis.report.copies import cores
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotSummary, compiled_simulator, simulate, simulate_batch
 from device.physics.scenes import FRICTION_N, NEAR, OUTPUTS

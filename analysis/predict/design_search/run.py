@@ -45,7 +45,8 @@ from analysis.predict.design_search.space import (
     simulate_rows,
 )
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
-from analysis.predict.jobs import RunPieces, cores, on_processes
+from analysis.predict.jobs import RunPieces, on_processes
+from analysis.report.copies import cores
 from analysis.report.page import write_page
 from analysis.report.serial import as_csv, as_json
 from analysis.report.terminal import Progress

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from analysis.predict.jobs import RunPieces, cores, on_cluster, on_processes
+from analysis.predict.jobs import RunPieces, on_cluster, on_processes
 from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, run_chunk
 from analysis.predict.power.page import grid_assumptions, in_short, sections
 from analysis.predict.power.planned import Tally
@@ -27,6 +27,7 @@ from analysis.predict.power.shards import (
     tallies_of,
     write_shard,
 )
+from analysis.report.copies import cores
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.serial import as_json

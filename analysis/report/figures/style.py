@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypedDict
@@ -19,6 +20,7 @@ from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
 
+from analysis.report.copies import in_copy
 from analysis.report.figures.glyphs import OWN_FONT, give_fonts, is_drawable
 from analysis.report.labels import cut_names, display_name, lines_of, some_labels, text_columns
 from analysis.report.section import PNG_DPI
@@ -62,7 +64,7 @@ def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure
         figure = Figure(figsize=(width_in, height_in), dpi=PNG_DPI, layout=layout, facecolor="white")
         yield figure
         give_fonts(figure)
-        save(figure, path_stem)
+        in_copy(partial(save, figure, path_stem))
 
 
 def panel_grid(figure: Figure, titles: Sequence[str], across: int) -> list[Axes]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from analysis.logs.files import name_below, shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
+from analysis.report.copies import process_copies
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.section import PageHead, PageNotice, Section, Table, names_in_full, shortened
@@ -117,9 +118,10 @@ def write_report(out: Path, report: ReportData, tell: Tell = untold) -> None:
     methods = [method for one in report.statistics.analysed.values() for method in one.methods]
     head = PageHead(notices=(*notices(report), *_notices_of_kept_apart(report)), files=(STATISTICS, *report.beside))
     with labelled(report.statistics.labels or {}, methods):
-        write_figures(out / "figures", report)
-        for one in report.apart:
-            write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
+        with process_copies():
+            write_figures(out / "figures", report)
+            for one in report.apart:
+                write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
         tell("figures")
         parts = sections(report)
         write_page(out, report.title, (*parts, *names_in_full()), head)
