@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from analysis.report import copies as module
-from analysis.report.copies import cores, in_copy, process_copies
+from analysis.report.copies import Tell, cores, in_copy, process_copies
 from device.words import RecoilError
 from tests.waiting import wait_for
 
@@ -25,7 +25,7 @@ def test_what_a_copy_writes_is_there_at_the_end(tmp_path: Path) -> None:
     """The second finds the one copy at work, or done: either way every file is there, each from one process."""
     with process_copies():
         for name in "abc":
-            in_copy(lambda name=name: (tmp_path / name).write_text(str(os.getpid())))
+            in_copy(lambda _, name=name: (tmp_path / name).write_text(str(os.getpid())))
     writers = [(tmp_path / name).read_text() for name in "abc"]
     assert writers[0] != str(os.getpid())
     assert len(writers) == 3
@@ -34,19 +34,19 @@ def test_what_a_copy_writes_is_there_at_the_end(tmp_path: Path) -> None:
 def test_what_a_copy_changes_in_memory_is_lost_with_it() -> None:
     seen: list[int] = []
     with process_copies():
-        in_copy(lambda: seen.append(1))
+        in_copy(lambda _: seen.append(1))
     assert seen == []
 
 
 def test_where_none_are_allowed_the_work_is_done_at_once() -> None:
     seen: list[int] = []
-    in_copy(lambda: seen.append(os.getpid()))
+    in_copy(lambda _: seen.append(os.getpid()))
     assert seen == [os.getpid()]
 
 
 def test_a_copy_makes_no_copies(tmp_path: Path) -> None:
-    def twice() -> None:
-        in_copy(lambda: (tmp_path / "inner").write_text(str(os.getpid())))
+    def twice(_: Tell) -> None:
+        in_copy(lambda _: (tmp_path / "inner").write_text(str(os.getpid())))
         (tmp_path / "outer").write_text(str(os.getpid()))
 
     with process_copies():
@@ -57,17 +57,39 @@ def test_a_copy_makes_no_copies(tmp_path: Path) -> None:
 def test_an_error_of_a_copy_is_raised_with_its_file(tmp_path: Path) -> None:
     missing = tmp_path / "nowhere" / "figure.svg"
     with pytest.raises(FileNotFoundError) as found, process_copies():
-        in_copy(lambda: missing.write_text(""))
+        in_copy(lambda _: missing.write_text(""))
     assert found.value.filename == str(missing)
 
 
 def test_a_copy_that_is_killed_is_told() -> None:
     with pytest.raises(RecoilError, match="was killed"), process_copies():
-        in_copy(lambda: os.kill(os.getpid(), signal.SIGKILL))
+        in_copy(lambda _: os.kill(os.getpid(), signal.SIGKILL))
+
+
+def test_an_error_that_cannot_be_sent_is_told_in_its_words() -> None:
+    class OwnError(Exception):
+        pass
+
+    def fail(_: Tell) -> None:
+        raise OwnError("the reason")
+
+    with pytest.raises(RecoilError, match="the reason"), process_copies():
+        in_copy(fail)
+
+
+def test_who_waits_hears_of_each_part() -> None:
+    def three_parts(tell: Tell) -> None:
+        for name in "abc":
+            tell(name)
+
+    heard: list[str] = []
+    with process_copies():
+        in_copy(three_parts, heard.append)
+    assert heard == ["a", "b", "c"]
 
 
 def test_who_is_interrupted_leaves_no_copy(tmp_path: Path) -> None:
-    def for_ever() -> None:
+    def for_ever(_: Tell) -> None:
         (tmp_path / "pid").write_text(str(os.getpid()))
         time.sleep(600)
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from analysis.predict.check import check
-from analysis.predict.reproduction.reproduce import prepared, reproduce
+from analysis.predict.reproduction.reproduce import reproduce
+from analysis.predict.reproduction.study import prepared
 from analysis.summary.analyze import Request, analyze
 from recoil.config_files import new_study
 

@@ -14,7 +14,7 @@ from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
 from analysis.predict.drawn import DirectionStudies, RatingStudies, studies_of
-from analysis.predict.reproduction import reproduce
+from analysis.predict.reproduction.study import prepared
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
 from analysis.summary.summary import summarize
 from experiments.design.streams import generator
@@ -151,10 +151,10 @@ def test_the_tables_of_reconstructed_answers_seat_the_same_people_again(reproduc
 
 def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     """Loaded, not run: they are the setups of the configs themselves."""
-    study, other = reproduce.prepared("study", 1, "rates"), reproduce.prepared("study", 2)
+    study, other = prepared("study", 1, "rates"), prepared("study", 2)
     assert study.answering == study.setups
     assert "other participants were asked for" in study.notes[0]
-    assert other.manifest() == reproduce.prepared("study", 2, "reconstructed").manifest()
+    assert other.manifest() == prepared("study", 2, "reconstructed").manifest()
     assert other.manifest() != study.manifest()
     laws = [setup.laws.questions[question] for setup, question in zip(other.answering, QUESTIONS, strict=True)]
     assert [law.law for law in laws] == ["table", "table"]
@@ -200,7 +200,7 @@ def test_a_study_that_the_published_numbers_do_not_fit_is_that_of_its_configs(tm
     subprocess.run(warm("configs", "--copy", tmp_path / "quick"), check=True, capture_output=True)
     study = tmp_path / "quick" / "study.toml"
     study.write_text(study.read_text().replace("participants = 14", "participants = 2"))
-    assert "the study has 2 participants, the paper 14" in reproduce.prepared(str(study), 1).notes[0]
+    assert "the study has 2 participants, the paper 14" in prepared(str(study), 1).notes[0]
     asked = warm("reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed")
     refused = subprocess.run(asked, check=False, capture_output=True, text=True)
     assert (refused.returncode, "the study has 2 participants" in refused.stderr) == (2, True)

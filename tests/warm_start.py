@@ -52,6 +52,7 @@ PRELOADED = [
     "analysis.predict.fit.times",
     "analysis.predict.power.run",
     "analysis.predict.reproduction.reproduce",
+    "analysis.predict.reproduction.results",
     "analysis.predict.simulate.run",
     "analysis.summary.analyze",
     "experiments.screens.console.app",

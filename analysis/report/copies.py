@@ -7,6 +7,7 @@ may only compute and write files; and copies are made on Linux alone, whose libr
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -20,16 +21,19 @@ from multiprocessing.process import BaseProcess
 
 from device.words import RecoilError
 
-Work = Callable[[], object]
+Tell = Callable[[str], object]
+Work = Callable[[Tell], object]
+"""Is given somebody to tell of each part that is done."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @dataclass(frozen=True, slots=True)
 class _Copy:
-    """A copy at work; what it says at its end is the error that it met, or nothing."""
+    """A copy at work. It says each part that is done, and at its end the error that it met, or nothing."""
 
     process: BaseProcess
     said: Connection
+    tell: Tell
 
 
 _AT_WORK: ContextVar[list[_Copy] | None] = ContextVar("copies", default=None)
@@ -51,13 +55,20 @@ def process_copies() -> Iterator[None]:
             copy.process.join()
 
 
-def in_copy(work: Work) -> None:
-    """Do some work that only writes files: in a copy where `process_copies` allows it and a core is idle, else here."""
+def untold(part: str) -> None:
+    """Nobody waits."""
+
+
+def in_copy(work: Work, tell: Tell = untold) -> None:
+    """Do some work that only writes files: in a copy where `process_copies` allows it and a core is idle, else here.
+
+    `tell` hears of the parts of the work, as late as at the end of `process_copies`.
+    """
     begun = _AT_WORK.get()
-    if begun is None or sys.platform != "linux" or sum(not copy.said.poll() for copy in begun) >= cores() - 1:
-        work()
+    if begun is None or sys.platform != "linux" or sum(copy.process.is_alive() for copy in begun) >= cores() - 1:
+        work(tell)
     else:
-        begun.append(_begin(work))
+        begun.append(_begin(work, tell))
 
 
 def cores() -> int:
@@ -65,31 +76,41 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _begin(work: Work) -> _Copy:
-    said, tell = get_context("fork").Pipe(duplex=False)
-    process = get_context("fork").Process(target=_work, args=(work, tell))
+def _begin(work: Work, tell: Tell) -> _Copy:
+    said, end = get_context("fork").Pipe(duplex=False)
+    process = get_context("fork").Process(target=_work, args=(work, end))
     with no_interrupt():
         process.start()
-    tell.close()
-    return _Copy(process, said)
+    end.close()
+    return _Copy(process, said, tell)
 
 
-def _work(work: Work, tell: Connection) -> None:
+def _work(work: Work, end: Connection) -> None:
     """In the copy: what a signal means is the first process's affair, which ends its copies."""
     _AT_WORK.set(None)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
     try:
-        work()
+        work(end.send)
     except Exception as error:  # noqa: BLE001 - raised again in the process that waits
-        tell.send(error)
+        end.send(_as_sent(error))
     else:
-        tell.send(None)
+        end.send(None)
+
+
+def _as_sent(error: Exception) -> Exception:
+    """An error, or its words where it cannot be sent itself."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - our own
+    except Exception:  # noqa: BLE001 - whatever an error's own constructor raises
+        return RecoilError(str(error))
+    return error
 
 
 def _wait_for(copy: _Copy) -> None:
     try:
-        error = copy.said.recv()
+        while isinstance(error := copy.said.recv(), str):
+            copy.tell(error)
     except EOFError:
         raise RecoilError("a process that worked beside this one was killed (too little memory?); run again") from None
     copy.process.join()

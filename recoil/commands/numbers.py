@@ -46,14 +46,17 @@ def reproduce(
 ) -> None:
     """Both experiments with synthetic participants on the simulated gun: logs, statistics, figures, report."""
     from analysis.predict.reproduction import reproduce as feature
+    from analysis.predict.reproduction.study import prepared
 
-    loaded = feature.prepared(study, seed, observer.value if observer else None)
+    loaded = prepared(study, seed, observer.value if observer else None)
     if not loaded.reconstructed and observer is None:
         say("\n".join(f"recoil: {note}" for note in loaded.notes))
     say_how_long(feature.reproduction_time_s(loaded))
     with progress("reproduce", len(loaded.runs) + 3) as tell:
         done = feature.reproduce(loaded, out, tell)
-    show(done.statistics, f"{feature.comparison_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
+    from analysis.predict.reproduction.results import comparison_text
+
+    show(done.statistics, f"{comparison_text(done.comparison)}\n\nReport: {out / 'report.html'}", as_json)
 
 
 def analyze(

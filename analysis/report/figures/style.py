@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypedDict
@@ -64,7 +63,7 @@ def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure
         figure = Figure(figsize=(width_in, height_in), dpi=PNG_DPI, layout=layout, facecolor="white")
         yield figure
         give_fonts(figure)
-        in_copy(partial(save, figure, path_stem))
+        in_copy(lambda _: save(figure, path_stem))
 
 
 def panel_grid(figure: Figure, titles: Sequence[str], across: int) -> list[Axes]:

@@ -39,8 +39,10 @@ _MARKS = "* p < .05, ** p < .01, *** p < .001, n.s. not significant"
 
 
 def write_figures(folder: Path, report: ReportData) -> None:
-    """Every figure that has data, under the stem that its picture names."""
+    """Every figure that has data, under the stem that its picture names; the one that takes longest first."""
     statistics, direction = report.statistics, report.statistics.direction
+    if report.panels:
+        figure_5(report.panels, folder / _SHOT_FIGURE)
     if statistics.analysed:
         figure_8(statistics, folder / _RESULTS_FIGURE)
     if direction is not None and direction.n:
@@ -50,8 +52,6 @@ def write_figures(folder: Path, report: ReportData) -> None:
         _write_models(folder, name, one)
     if report.delivered:
         figure_delivered(report.delivered, folder / DELIVERED_FIGURE)
-    if report.panels:
-        figure_5(report.panels, folder / _SHOT_FIGURE)
 
 
 def _write_design(folder: Path, name: str, design: DesignSummary) -> None:
