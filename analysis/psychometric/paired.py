@@ -83,12 +83,7 @@ def paired_scores(
     [('a', 0.944), ('b', -0.16), ('c', -0.783)]
     """
     items = row_labels(items, "items")
-    wins_of = _of_people(items, wins, "wins")
-    ties_of = np.zeros_like(wins_of) if ties is None else _of_people(items, ties, "ties")
-    if not np.array_equal(ties_of, ties_of.swapaxes(1, 2)):
-        raise ValueError("ties must be the same on both sides of each pair")
-    if len(ties_of) != len(wins_of):
-        raise ValueError(f"ties must be of as many people as wins, {len(wins_of)}, not {len(ties_of)}")
+    wins_of, ties_of = _counted(items, wins, ties)
     won, tied = wins_of.sum(axis=0), ties_of.sum(axis=0)
     one_of(model, "model", get_args(PairModel))
     level = share(confidence, "confidence")
@@ -99,20 +94,15 @@ def paired_scores(
         reason = "with so many ties scores of any size fit alike; more choices without ties would tell"
         return PairedScores(model=model, reason=reason)
     fit, covariance = found
-    basis, people = _basis(len(items)), len(wins_of)
+    basis = _basis(len(items))
     scores, ses = basis @ fit[: len(items) - 1], _errors(basis, covariance)
     reach = float(scipy.special.ndtri((1 + level) / 2)) * ses
-    if people > 1:
-        slopes = _slopes(fit, wins_of, ties_of, model)
-        between = np.asarray(covariance @ slopes.T @ slopes @ covariance * people / (people - 1))
-        robust = _errors(basis, between)
-        ses, reach = (
-            np.maximum(ses, robust),
-            np.maximum(reach, scipy.special.stdtrit(people - 1, (1 + level) / 2) * robust),
-        )
+    if len(wins_of) > 1:
+        robust, robust_reach = _over_people(basis, covariance, _slopes(fit, wins_of, ties_of, model), level)
+        ses, reach = np.maximum(ses, robust), np.maximum(reach, robust_reach)
     return PairedScores(
         model=model,
-        people=people,
+        people=len(wins_of),
         scores=tuple(
             ItemScore(item=item, score=float(s), se=float(se), low=float(s - half), high=float(s + half))
             for item, s, se, half in zip(items, scores, ses, reach, strict=True)
@@ -157,6 +147,15 @@ def _fitted(won: FloatArray, tied: FloatArray, model: PairModel) -> tuple[FloatA
     return (fit, covariance) if held else None
 
 
+def _over_people(
+    basis: FloatArray, covariance: FloatArray, slopes: FloatArray, level: float
+) -> tuple[FloatArray, FloatArray]:
+    """Errors by a sandwich over people from each one's slope, and half the lengths of the intervals by Student's t."""
+    people = len(slopes)
+    errors = _errors(basis, np.asarray(covariance @ slopes.T @ slopes @ covariance * people / (people - 1)))
+    return errors, np.asarray(scipy.special.stdtrit(people - 1, (1 + level) / 2) * errors)
+
+
 def _errors(basis: FloatArray, covariance: FloatArray) -> FloatArray:
     free = basis.shape[1]
     return np.asarray(np.sqrt(np.diag(basis @ covariance[:free, :free] @ basis.T)))
@@ -174,6 +173,17 @@ def _slopes(at: FloatArray, wins: FloatArray, ties: FloatArray, model: PairModel
         (8 * (terms(at + h) - terms(at - h)) - terms(at + 2 * h) + terms(at - 2 * h)) / (12 * _STEP) for h in steps
     ]
     return np.asarray(np.einsum("cpij,kcij->pk", np.stack([wins, ties / 2]), np.stack(rises)))
+
+
+def _counted(items: Sequence[Hashable], wins: ArrayLike, ties: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
+    """Both counts (people, n, n), which agree."""
+    won = _of_people(items, wins, "wins")
+    tied = np.zeros_like(won) if ties is None else _of_people(items, ties, "ties")
+    if not np.array_equal(tied, tied.swapaxes(1, 2)):
+        raise ValueError("ties must be the same on both sides of each pair")
+    if len(tied) != len(won):
+        raise ValueError(f"ties must be of as many people as wins, {len(won)}, not {len(tied)}")
+    return won, tied
 
 
 def _of_people(items: Sequence[Hashable], counts: ArrayLike, name: str) -> FloatArray:

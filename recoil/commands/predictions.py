@@ -29,7 +29,6 @@ SimulatedOption = Annotated[
 ]
 NullOption = Annotated[bool, typer.Option("--null", help="People who feel no difference: false positives.")]
 SchedulerOption = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on this Dask cluster instead.")]
-POWER_TARGET, PAPER_CONFIG = 0.8, "paper"
 ConfigUnlessMergedArgument = Annotated[
     str | None, typer.Argument(help="File or name of a shipped config; with --merge that of the shards unless given.")
 ]
@@ -42,6 +41,7 @@ MergeOption = Annotated[
 
 
 def power(
+    ctx: typer.Context,
     config: ConfigUnlessMergedArgument = None,
     *,
     participants: ParticipantsOption = None,
@@ -49,10 +49,10 @@ def power(
     methods: MethodsOption = None,
     effect: EffectOption = None,
     studies: SimulatedOption = None,
-    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = POWER_TARGET,
+    target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
     null: NullOption = False,
     seed: terminal.FixedSeedOption = 1,
-    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = PAPER_CONFIG,
+    paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
     workers: terminal.WorkersOption = None,
     scheduler: SchedulerOption = None,
     shard: ShardOption = None,
@@ -73,16 +73,8 @@ def power(
     if config is None and merge is None:
         raise ConfigError("CONFIG is missing: name a file or a shipped config, as in `recoil power direction`")
     if config is not None and procedures_of(config):
-        given: dict[str, object] = {
-            "--participants": participants,
-            "--methods": methods,
-            "--effect": effect,
-            "--null": null,
-        }
-        given |= {"--scheduler": scheduler, "--workers": workers, "--shard": shard, "--merge": merge}
-        given |= {"--target": target != POWER_TARGET, "--paper": paper != PAPER_CONFIG}
-        unused = [name for name, one in given.items() if one]
-        return _of_threshold(config, trials, studies, seed, out, as_json, unused)
+        _check_only(ctx, f"{config} has a threshold", ("config", "trials", "studies", "seed", "out", "as_json"))
+        return _of_threshold(config, trials, studies, seed, out, as_json)
     request = feature.PowerRequest(
         config=config or "",
         participants=participants,
@@ -106,17 +98,24 @@ def power(
     return terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
-def _of_threshold(
-    config: str, trials: str | None, people: int | None, seed: int, out: Path, as_json: bool, unused: list[str]
-) -> None:
-    from analysis.predict.threshold_plan import page
-    from analysis.predict.threshold_plan.run import OBSERVERS, TRACK_TRIALS, ThresholdRequest
+def _check_only(ctx: typer.Context, why: str, known: tuple[str, ...]) -> None:
+    """`ConfigError` naming the options that were given and say nothing there."""
     from experiments.config.door import ConfigError
 
+    given = [
+        one
+        for one in ctx.command.params
+        if (source := ctx.get_parameter_source(one.name or "")) and source.name == "COMMANDLINE"
+    ]
+    unused = [one.opts[0] for one in given if one.name not in known]
     if unused:
-        raise ConfigError(
-            f"{', '.join(unused)}: {config} has a threshold, of which only --trials and --studies are asked"
-        )
+        raise ConfigError(f"{', '.join(unused)}: {why}, of which only --trials and --studies are asked")
+
+
+def _of_threshold(config: str, trials: str | None, people: int | None, seed: int, out: Path, as_json: bool) -> None:
+    from analysis.predict.threshold_plan import page
+    from analysis.predict.threshold_plan.run import OBSERVERS, TRACK_TRIALS, ThresholdRequest
+
     request = ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, observers=people or OBSERVERS, seed=seed)
     found = page.threshold_plan(request, out, terminal.progress)
     terminal.show(found, f"{terminal.in_text(page.plan_in_short(found))}\nReport: {out / 'report.html'}", as_json)
