@@ -31,8 +31,8 @@ from tests.shown_languages import opened_in
 OUT = Path(__file__).parent / "pictures"
 ROOT = Path(__file__).parent.parent
 SIZE = "1280x800"
-COLOURS = 96
-"""So many colours are enough for windows and figures, and make small files."""
+COLOURS = 160
+"""So many colours are enough for windows and figures, and make small files, where each that there is is near to one."""
 PARTICIPANT = "Recoil: participant"
 FIGURES = {
     "shot": "simulate --method asymmetric-2 --plot OUT/shot.png",
@@ -49,7 +49,8 @@ def keep(image: Image.Image, name: str, width: int = 1280) -> None:
     """Write a picture in few colours, no wider than `width`."""
     if image.width > width:
         image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
-    image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(OUT / f"{name}.png", optimize=True)
+    few = image.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
+    few.save(OUT / f"{name}.png", optimize=True)
     sys.stdout.write(f"{name}.png\n")
 
 

@@ -74,7 +74,7 @@ class TimesPanel:
 
 def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], path_stem: Path) -> None:
     """Predicted forward rate over friction (bands 95 %) with the observed rates; PNG, SVG and PDF are written."""
-    with drawn(path_stem, 6.6, 3.9) as figure:
+    with drawn(path_stem, 6.6, 4.3) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[0.16, 1.0], sharey=True)
         apart = [point for point in points if point.friction_N is None]
         for place, point in enumerate(apart):
@@ -93,7 +93,7 @@ def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], pat
             light_grid(axes)
             axes.set_ylim(100.0 * max(lowest, -0.02), 101.0)
         reference_line(right, 50.0, "chance")
-        right.legend(loc="lower right", fontsize=7.5, framealpha=1.0, edgecolor="none", handlelength=3.2)
+        legend_below(figure, right, 3)
 
 
 def figure_places(spreads: Sequence[SimulatedSpread], path_stem: Path) -> None:

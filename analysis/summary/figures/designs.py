@@ -34,6 +34,8 @@ _ACROSS = 2
 _LEGEND_COLUMNS = 3
 _TICKS = 10
 """So many levels have a tick each."""
+_ASIDE = 0.012
+"""So far, as a share of the axis, two series of numbers stand apart: about a mark's width."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +91,15 @@ def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary
     cells = [cell for cell in question.cells if factor is None or factor in cell.levels]
     places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
     numeric = all(isinstance(level, float) for level in places)
-    for i, (label, some) in enumerate(_series(cells, factor, found).items()):
+    series = _series(cells, factor, found)
+    logarithmic = question.kind == "number" and numeric and min(places.values()) > 0
+    for i, (label, some) in enumerate(series.items()):
         marks = sorted(_marks(question, some, factor, places), key=lambda mark: mark.x)
-        _draw_series(axes, marks, i, label, joined=numeric, logarithmic=question.kind == "number")
+        aside = i - (len(series) - 1) / 2  # marks and bars of several series would hide each other
+        shifted = [replace(mark, x=_shifted(mark.x, aside, [*places.values()], numeric, logarithmic)) for mark in marks]
+        _draw_series(axes, shifted, i, label, joined=numeric)
+    if question.kind == "number":
+        _logarithmic(axes, both=logarithmic)
     labels = found.labels.get(factor or "", {})
     names = [labels.get(shown_level(level), shown_level(level)) for level in places]  # the axis has the unit
     _label(axes, name, question, factor)
@@ -136,12 +144,19 @@ def _marks(
             yield MeanMark(x=x, mean=cell.mean, low=cell.mean - spread, high=cell.mean + spread)
 
 
-def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, joined: bool, logarithmic: bool) -> None:
+def _shifted(x: float, aside: float, places: Sequence[float], numeric: bool, logarithmic: bool) -> float:
+    """Where a mark of a series stands that is so many places aside of the middle one."""
+    if not numeric:
+        return x + 0.06 * aside
+    low, high = min(places), max(places)
+    return x * (high / low) ** (_ASIDE * aside) if logarithmic else x + _ASIDE * (high - low) * aside
+
+
+def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, joined: bool) -> None:
     if not marks:
         return
-    aside = 0.0 if joined else 0.06 * (i - 0.5)  # marks of several series would hide each other
     axes.errorbar(
-        [mark.x + aside for mark in marks],
+        [mark.x for mark in marks],
         [mark.mean for mark in marks],
         yerr=[[mark.mean - mark.low for mark in marks], [mark.high - mark.mean for mark in marks]],
         color=method_colour(i),
@@ -152,12 +167,14 @@ def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, j
         linewidth=1.2,
         label=label or None,
     )
-    if logarithmic:
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(ScalarFormatter())
-        axes.yaxis.set_minor_formatter(ScalarFormatter())
-        if joined and min(mark.x for mark in marks) > 0:
-            axes.set_xscale("log")
+
+
+def _logarithmic(axes: Axes, *, both: bool) -> None:
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(ScalarFormatter())
+    axes.yaxis.set_minor_formatter(ScalarFormatter())
+    if both:
+        axes.set_xscale("log")
 
 
 def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
