@@ -12,7 +12,9 @@ import pytest
 
 from analysis.archive.bids import data_set, runs_of
 from analysis.logs.reading import read_logs
+from analysis.report.figures import style
 from analysis.summary.analyze import Request, analyze
+from analysis.summary.figures.designs import figure_design
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
 from experiments.clock import VirtualClock
@@ -133,6 +135,16 @@ def test_of_pairs_each_level_has_how_often_it_was_chosen(found):
     assert question.preferred is not None
     assert [cell.levels["method"] for cell in question.preferred] == list(found["pairs"].factors["method"])
     assert sum(cell.mean for cell in question.preferred) == pytest.approx(len(question.preferred) / 2)
+
+
+def test_bars_of_several_series_over_numbers_stand_side_by_side(found, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(found["voltages"], tmp_path / "figure")
+    (axes,) = drawn[0].axes
+    forward, backward = ([float(x) for x in series.lines[0].get_xdata()] for series in axes.containers)
+    assert all(x < other for x, other in zip(forward, backward, strict=True))
+    assert [(x + other) / 2 for x, other in zip(forward, backward, strict=True)] == pytest.approx(axes.get_xticks())
 
 
 def test_the_file_has_each_design_beside_the_two_experiments_and_the_report_its_figure(results, tmp_path):
