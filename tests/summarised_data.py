@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import isqrt
 from random import Random
 
-from analysis.paper.audit.means import scale_of
-from analysis.paper.audit.reconstruct import Constraints, meets, printed_constraints
+from analysis.paper.audit.means import AnswerScale, scale_of
+from analysis.paper.audit.printed import Rounding, read_printed
+from analysis.paper.audit.reconstruct import ColumnOrder, ConditionColumn, Constraints, meets
 
 MEANS = {"vibration": 2.4, "asymmetric-1": 6.0, "asymmetric-2": 7.8}
 Rows = tuple[tuple[int, ...], ...]
@@ -52,6 +53,36 @@ def summarised(rows: Rows, top: int, *, with_sds: bool) -> Constraints | None:
         F = half_up(Fraction((n - 1) * a, n * w - a))
     sds = [root_half_up(square) for square in squares] if with_sds else None
     return printed_constraints(n, means, scale_of("1", "0", str(top)), sds=sds, F=F)
+
+
+def printed_constraints(
+    n: int,
+    means: Sequence[str],
+    scale: AnswerScale,
+    *,
+    sds: Sequence[str] | None = None,
+    F: str | None = None,
+    orders: Sequence[ColumnOrder] = (),
+) -> Constraints:
+    """The constraints that printed means, SDs and F make of n participants on a scale with both ends.
+
+    Data count in grains above the scale's lower end: `scale.value` gives their values.
+    `ValueError` for text that is no number, or a scale without ends.
+    """
+    if scale.low is None or scale.high is None:
+        raise ValueError("a reconstruction needs a scale with both ends")
+    spreads = (
+        [None] * len(means) if sds is None else [read_printed(sd).interval(Rounding.HALF_UP).squared() for sd in sds]
+    )
+    columns = tuple(
+        ConditionColumn(
+            sums=scale.sums(read_printed(mean).interval(Rounding.HALF_UP), n),
+            variance=None if spread is None else spread.mapped(lambda value: value / scale.grain**2),
+        )
+        for mean, spread in zip(means, spreads, strict=True)
+    )
+    interval = None if F is None else read_printed(F).interval(Rounding.HALF_UP)
+    return Constraints(n=n, top=scale.high, columns=columns, F=interval, orders=tuple(orders))
 
 
 def cases(k: int, with_sds: bool, count: int, seed: int = 5) -> Iterator[Constraints]:

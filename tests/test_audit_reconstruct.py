@@ -19,14 +19,13 @@ from analysis.paper.audit.reconstruct import (
     ConditionColumn,
     Constraints,
     meets,
-    printed_constraints,
     reconstruct,
 )
 from analysis.paper.audit.variance_ratios import repeated_f
 from analysis.paper.paper import Paper, load_paper
 from analysis.stats.binomial import binomial_test
 from tests.exact import exact_rm_F
-from tests.summarised_data import DESIGNS, MEANS, cases, summarised
+from tests.summarised_data import DESIGNS, MEANS, cases, printed_constraints, summarised
 
 METHODS = ["vibration", "asymmetric-1", "asymmetric-2"]
 ASSUMED = {"vibration": 0.479, "asymmetric-1": 0.793, "asymmetric-2": 0.929}

@@ -84,7 +84,6 @@ def test_a_track_turns_where_it_should() -> None:
     found = track_after(rule, [True, True, True, False, True, True, False])
     assert found.levels == (10.0, 10.0, 8.0, 8.0, 9.0, 9.0, 8.0)
     assert (found.reversals, found.next_level) == ((8.0, 9.0, 8.0), None)
-    assert found.mean_of_reversals == 8.5
 
 
 def test_a_track_at_the_end_of_its_range_says_so() -> None:

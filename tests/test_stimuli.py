@@ -19,8 +19,13 @@ def gun():
     return load_gun(shipped_folder() / "gun.toml")
 
 
+def of_intervals(config, gun, trial):
+    held = [trial.levels_at(place) for place in range(max(1, len(trial.intervals)))]
+    return tuple(levels and stimuli.stimulus(config, gun, levels) for levels in held)
+
+
 def shots(config, gun):
-    return [stimuli.intervals(config, gun, trial) for trial in plan_of(config, "P01", 1).trials]
+    return [of_intervals(config, gun, trial) for trial in plan_of(config, "P01", 1).trials]
 
 
 def test_a_method_is_the_guns_own(gun):
@@ -52,7 +57,7 @@ def test_what_a_hand_sets_is_told_to_the_model_and_to_the_experimenter(gun):
     )
     plan = plan_of(config, "P01", 1)
     found = {
-        stimuli.settings(config, gun, trial.levels): stimuli.intervals(config, gun, trial)[0].parameters.friction_N
+        stimuli.settings(config, gun, trial.levels): of_intervals(config, gun, trial)[0].parameters.friction_N
         for trial in plan.trials
     }
     assert found == {(("damper", "off"),): 0.21, (("damper", "strips on"),): 1.12}

@@ -53,7 +53,7 @@ def test_it_fits_its_gun_and_its_people_answer_every_question(name):
         steps = [step for step, _ in driven(session_of(design, gun, plan)) if isinstance(step, Asking)]
         asked_for = {(step.trial, step.question): step for step in steps}
         for trial in plan.trials:
-            assert len(stimuli.intervals(design, gun, trial)) == design.trial.intervals
+            assert max(1, len(trial.intervals)) == design.trial.intervals
             for asked in design.questions:
                 given = person.answer(trial, asked)
                 assert is_answer(asked_for[trial, asked], given.value)

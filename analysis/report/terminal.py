@@ -31,7 +31,6 @@ AsJsonOption = Annotated[bool, typer.Option("--json", help="Print the machine-re
 SeedOption = Annotated[int | None, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
 FixedSeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random streams.")]
 GunConfigOption = Annotated[str, typer.Option(help="Config of a gun, or the name of a shipped one.")]
-ConfigArgument = Annotated[str, typer.Argument(help="File or name of a shipped config.")]
 ColumnsOption = Annotated[
     Path | None, typer.Option(metavar="MAP.toml", help="Which columns mean what in logs that Recoil did not write.")
 ]

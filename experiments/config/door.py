@@ -151,14 +151,6 @@ Sex = Literal["female", "male", "other", "undisclosed"]
 Handedness = Literal["right", "left", "both"]
 
 
-def _distinct(methods: tuple[str, ...]) -> tuple[str, ...]:
-    doubled = sorted({name for name in methods if methods.count(name) > 1})
-    if doubled:
-        raise ValueError(f"{', '.join(doubled)} stands there more than once; name each method once")
-    return methods
-
-
-Count = Annotated[int, Field(ge=1, le=10_000)]
 Seconds = Annotated[float, Field(ge=0, le=86_400)]
 PositiveSeconds = Annotated[float, Field(gt=0, le=3_600)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -175,7 +167,6 @@ def printable(text: str) -> str:
 
 
 Text = Annotated[str, Field(min_length=1, max_length=2_000), AfterValidator(printable)]
-Methods = Annotated[tuple[Text, ...], Field(min_length=1, max_length=26), AfterValidator(_distinct)]
 
 
 class ConsoleConfig(Model):

@@ -85,12 +85,6 @@ def settings(design: DesignConfig, gun: GunConfig, levels: Condition) -> tuple[t
     return tuple((held | {name: design.factors[name].label(level) for name, level in levels if name in names}).items())
 
 
-def intervals(design: DesignConfig, gun: GunConfig, trial: Trial) -> tuple[IntervalStimulus | None, ...]:
-    """The stimulus of each interval; `None` for one that is empty. `ConfigError` as `stimulus`."""
-    held = [trial.levels_at(place) for place in range(max(1, len(trial.intervals)))]
-    return tuple(None if levels is None else stimulus(design, gun, levels) for levels in held)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stimuli:
     """All that a run can fire: what the gun is opened with, and the shot of some levels.

@@ -20,9 +20,6 @@ from experiments.session.history import History
 from experiments.session.remarks import EntryCorrected, Remark
 from experiments.tasks.questions import AnswerValue, is_success, share_of_first
 
-_OF_A_PRESENTATION = steps.FireShot | steps.Present | steps.Asking
-"""Steps whose trial is presented again where they are broken off."""
-
 
 @dataclass(frozen=True, slots=True)
 class CountedAnswer:

@@ -37,7 +37,6 @@ from experiments.synthetic.percept import PerceptConfig
 from experiments.synthetic.preference import Appeal
 
 Positive = Annotated[float, Field(gt=0, le=1e9)]
-SaidText = Annotated[str, Field(max_length=2_000), AfterValidator(printable)]
 
 EVERYWHERE = "all"
 """The cell of a law that does not say by what it differs."""

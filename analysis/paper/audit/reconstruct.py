@@ -22,8 +22,7 @@ from math import comb, exp, prod, sqrt
 from random import Random
 
 from analysis.paper.audit import lattices
-from analysis.paper.audit.means import AnswerScale
-from analysis.paper.audit.printed import Interval, Rounding, read_printed
+from analysis.paper.audit.printed import Interval
 
 _DRAW_STEPS, _EXACT = 3_000, 6
 
@@ -123,35 +122,6 @@ class Reconstruction:
     succeeded: int
     exists: bool | None
     space: int | None = None
-
-
-def printed_constraints(
-    n: int,
-    means: Sequence[str],
-    scale: AnswerScale,
-    *,
-    sds: Sequence[str] | None = None,
-    F: str | None = None,
-    orders: Sequence[ColumnOrder] = (),
-    rounding: Rounding = Rounding.HALF_UP,
-) -> Constraints:
-    """The constraints that printed means, SDs and F make of n participants on a scale with both ends.
-
-    Data count in grains above the scale's lower end: `scale.value` gives their values.
-    `ValueError` for text that is no number, or a scale without ends.
-    """
-    if scale.low is None or scale.high is None:
-        raise ValueError("a reconstruction needs a scale with both ends")
-    spreads = [None] * len(means) if sds is None else [read_printed(sd).interval(rounding).squared() for sd in sds]
-    columns = tuple(
-        ConditionColumn(
-            sums=scale.sums(read_printed(mean).interval(rounding), n),
-            variance=None if spread is None else spread.mapped(lambda value: value / scale.grain**2),
-        )
-        for mean, spread in zip(means, spreads, strict=True)
-    )
-    interval = None if F is None else read_printed(F).interval(rounding)
-    return Constraints(n=n, top=scale.high, columns=columns, F=interval, orders=tuple(orders))
 
 
 def reconstruct(wanted: Constraints, seed: int = 0, *, count: int = 1, starts: int = 60) -> Reconstruction:

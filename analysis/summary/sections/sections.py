@@ -14,16 +14,21 @@ from analysis.report.page import write_page
 from analysis.report.section import PageHead, PageNotice, Section, Table, names_in_full, shortened
 from analysis.report.serial import as_json
 from analysis.report.terminal import Tell, untold
-from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.delivered import delivered_section
-from analysis.summary.sections.designs import sections_of_designs
-from analysis.summary.sections.experiments import direction_section, everybodys_values, preference_section
-from analysis.summary.sections.glance import glance_section
+from analysis.summary.sections.designs import result_sentences, sections_of_designs
+from analysis.summary.sections.experiments import (
+    direction_section,
+    effect_sentence,
+    everybodys_values,
+    pairs_sentence,
+    preference_section,
+)
 from analysis.summary.sections.manuscript import manuscript_section
 from analysis.summary.sections.participants import all_left_out, notices, participants_section, shown_root
-from analysis.summary.sections.pictures import write_figures
+from analysis.summary.sections.pictures import results_picture, write_figures
 from analysis.summary.sections.preregistration import deviations_sections
-from analysis.summary.sections.published import odds_section, published_sections, shot_section
+from analysis.summary.sections.published import agreement, odds_section, published_sections, shot_section
 from analysis.summary.sections.quality import quality_section, undefined_numbers
 from analysis.summary.sections.requested import requested_sections
 from analysis.summary.sections.supplement import supplement_sections
@@ -36,6 +41,30 @@ STATISTICS = "statistics.json"
 def sections(report: ReportData) -> tuple[Section, ...]:
     """All sections that have something to say."""
     return tuple(section for part in READERS_ORDER for section in part(report))
+
+
+def _glance(report: ReportData) -> Iterator[Section]:
+    """What was found, a paragraph an experiment and question; a paper's numbers are in the appendix."""
+    statistics, compared = report.statistics, report.comparison is not None
+    paragraphs = (
+        *_of_experiments(report),
+        *(text for name, one in statistics.designs.items() for text in result_sentences(name, one)),
+        *(
+            (f"Against the paper: {agreement(report.comparison)} They stand in the appendix.",)
+            if report.comparison
+            else ()
+        ),
+    )
+    pictures = (results_picture(statistics, compared=compared),) if statistics.analysed else ()
+    if paragraphs:
+        yield Section(title="Results", paragraphs=paragraphs, pictures=pictures)
+
+
+def _of_experiments(report: ReportData) -> Iterator[str]:
+    for name, found in report.statistics.analysed.items():
+        pairs = pairs_sentence(found, name, planned=report.planned)
+        words = " ".join(filter(None, [effect_sentence(found, name), pairs]))
+        yield f"{EXPERIMENTS[name].capitalize()}: {words[:1].lower()}{words[1:]}"
 
 
 def _finished(report: ReportData) -> Iterator[Section]:
@@ -81,7 +110,7 @@ def _kept_apart(report: ReportData) -> Iterator[Section]:
 READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     participants_section,
     deviations_sections,
-    glance_section,
+    _glance,
     direction_section,
     preference_section,
     sections_of_designs,

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 _HALVINGS = 60
 _EARLY = 2
-"""So many reversals are left out of the mean of a long track: they tell of its start."""
-_LONG = 6
+"""So many steps of Kesten's rule shrink by themselves, later ones with the reversals."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,16 +114,6 @@ class TrackState:
     levels: tuple[float, ...] = ()
     reversals: tuple[float, ...] = ()
     at_edge: bool = False
-
-    @property
-    def mean_of_reversals(self) -> float | None:
-        """The mean of an even number of reversals, the last ones; `None` before there are two.
-
-        The first two of six or more are left out.
-        """
-        skipped = _EARLY if len(self.reversals) >= _LONG else 0
-        counted = self.reversals[skipped + (len(self.reversals) - skipped) % 2 :]
-        return sum(counted) / len(counted) if counted else None
 
 
 def track_after(rule: UpDown | Kesten, answers: Iterable[bool]) -> TrackState:
