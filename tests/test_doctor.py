@@ -578,3 +578,18 @@ def test_a_display_that_nobody_serves_fails_with_what_to_do_and_stops_nothing(tm
     assert done.returncode == 1
     assert found["disk"]["verdict"] != "fails"
     assert "key to disk" in found
+
+
+@pytest.mark.parametrize(
+    ("sensor", "verdict", "said"),
+    [
+        ("simulated", "good", "3200 samples/s, noise 0.100"),
+        ("simulated:slip=2", "fails", "slip is 2; it must be from 0 to 1"),
+    ],
+)
+def test_a_simulated_sensor_is_one_check_among_all(tmp_path: Path, sensor: str, verdict: str, said: str) -> None:
+    planned = checks(tmp_path, "simulated", 0.01, sensor=sensor, friction_N=1.12)
+    assert len(planned) == len(checks(tmp_path, "simulated", 0.01)) + 1
+    (finding,) = next(carry_out_check(one) for one in planned if one.name == "sensor")
+    assert finding.verdict == verdict
+    assert said in finding.measured

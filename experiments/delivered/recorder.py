@@ -166,6 +166,10 @@ class ShotRecorder:
         if self._end.silent != self._silent and not self._ended:
             self._silent = self._end.silent
             self._note(_SILENT if self._silent else _HEARD)
+        self._tell_if_over()
+
+    def _tell_if_over(self) -> None:
+        """Tell of the presentation that was measured last, once its last shot was."""
         live = self._live
         over = live is None or self._latest is None or live.position.step is not self._latest.step
         if over and self._fired.empty():
@@ -182,6 +186,7 @@ class ShotRecorder:
         if found.mark in NOT_DELIVERED:
             self._undelivered.append(found)
             self._want_again(live, found)
+            self._tell_if_over()  # first, as a trial that comes again moves the run on
             self.offer_again()
 
     def _measured(self, shot: ShotFired) -> ShotMeasured:
@@ -246,7 +251,7 @@ class ShotRecorder:
         if not told or self._latest is None:
             return
         first, fired = told[0], self._latest.shot
-        some = "The shot was" if fired == 1 else f"{len(told)} of {fired} shots were"
+        some = "the shot was" if fired == 1 else f"{len(told)} of {fired} shots were"
         self._trouble(
             f"Trial {first.trial.trial}: {some} not delivered as {first.method} should be: {first.because}. "
             "Look at the damper, the coil and the sensor."
