@@ -16,7 +16,7 @@ from device.parameters import GunParameters
 from device.physics.hand import HandMechanics
 from device.sensor.expected import FINE_S, expected_shot, modelled_acceleration
 from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
-from experiments.delivered.marks import MethodLevels, ShotParts, judged
+from experiments.delivered.marks import MethodLevels, ShotParts, judged_shot
 from experiments.delivered.recorder import parts_of
 
 RATE_HZ = 3200.0
@@ -73,8 +73,8 @@ def marks_of(shots: Sequence[ShotParts]) -> list[str]:
     """The mark of each shot of a run of one method; empty for none."""
     levels, found = MethodLevels(), list[str]()
     for one in shots:
-        levels, judgement = judged(levels, one)
-        found.append(judgement.mark)
+        levels, verdict = judged_shot(levels, one)
+        found.append(verdict.mark)
     return found
 
 

@@ -180,7 +180,7 @@ class MethodLevels:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
+class ShotVerdict:
     """A mark, of what, and how far that is from what it is held against, as a part. Empty where there is none."""
 
     mark: DeliveryMark = ""
@@ -188,20 +188,20 @@ class Judgement:
     change: float = 0.0
 
 
-def judged(levels: MethodLevels, shot: ShotParts) -> tuple[MethodLevels, Judgement]:
+def judged_shot(levels: MethodLevels, shot: ShotParts) -> tuple[MethodLevels, ShotVerdict]:
     """The levels after a shot, and what is said of it: of the peak before the friction, of this before the mean."""
     peak, mark = after_shot(levels.peak, shot.peak, shot.peak_u)
-    found = [Judgement(mark=mark, quantity="peak", change=shot.peak / levels.peak.mean - 1)]
+    found = [ShotVerdict(mark=mark, quantity="peak", change=shot.peak / levels.peak.mean - 1)]
     levels = replace(levels, peak=peak)
     if shot.friction is not None:
         friction, mark = after_shot(levels.friction, shot.friction, shot.friction_spread)
-        found.append(Judgement(mark=mark, quantity="friction", change=shot.friction / levels.friction.mean - 1))
+        found.append(ShotVerdict(mark=mark, quantity="friction", change=shot.friction / levels.friction.mean - 1))
         levels = replace(levels, friction=friction)
         if not shot.rests and not any(one.mark for one in found):
             start, mark = after_start(levels.start, shot.friction / shot.peak, math.hypot(shot.friction_u, shot.peak_u))
-            found.append(Judgement(mark=mark, quantity="friction beside the peak", change=start.mean - 1))
+            found.append(ShotVerdict(mark=mark, quantity="friction beside the peak", change=start.mean - 1))
             levels = replace(levels, start=start)
-    return levels, next((one for one in found if one.mark), Judgement())
+    return levels, next((one for one in found if one.mark), ShotVerdict())
 
 
 def shots_to_see(part_u: float, spread: DeliverySpread = FRICTION_SPREAD) -> float:

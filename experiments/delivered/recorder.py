@@ -24,7 +24,7 @@ from device.sensor.simulated import SimulatedSensor, measures_by_model
 from device.sensor.streams import SensorError
 from device.words import Identity, Pulse
 from experiments.clock import Clock
-from experiments.delivered.marks import Judgement, MethodLevels, ShotParts, judged
+from experiments.delivered.marks import MethodLevels, ShotParts, ShotVerdict, judged_shot
 from experiments.live_run import LiveRun, Screen
 from experiments.session import events, judging
 from experiments.session.remarks import NOT_DELIVERED, Noted, Remark, ShotMeasured
@@ -236,8 +236,8 @@ class ShotRecorder:
             turn_rise=None if seen.turn_rise is None else round(seen.turn_rise, 3),
         )
         levels = self._levels.get(found.method, MethodLevels())
-        self._levels[found.method], judgement = judged(levels, parts_of(seen, expected))
-        return replace(found, mark=judgement.mark, because=reason_of(judgement, seen))
+        self._levels[found.method], verdict = judged_shot(levels, parts_of(seen, expected))
+        return replace(found, mark=verdict.mark, because=reason_of(verdict, seen))
 
     def _want_again(self, live: LiveRun, found: ShotMeasured) -> None:
         """Where the design says so, the trial is to come again, once."""
@@ -282,10 +282,10 @@ def parts_of(seen: DeliveredShot, expected: ExpectedShot) -> ShotParts:
     return replace(peak, friction=friction, friction_u=friction_u, turn_rise=seen.turn_rise or 0.0)
 
 
-def reason_of(judgement: Judgement, seen: DeliveredShot) -> str:
+def reason_of(verdict: ShotVerdict, seen: DeliveredShot) -> str:
     """Why a shot is marked; empty if it is not."""
-    far = f"{100 * judgement.change:+.0f} %"
-    match judgement.quantity:
+    far = f"{100 * verdict.change:+.0f} %"
+    match verdict.quantity:
         case "peak":
             return f"peak {seen.peak_m_s2:.3g} m/s², {far} from the shots before"
         case "friction":
