@@ -13,8 +13,10 @@ from pathlib import Path
 import pytest
 
 from experiments.session.states import State
-from tests.at_display import needs_display, remarks, virtual_display
+from tests.at_display import AtConsole, needs_display, remarks, virtual_display
 from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_in_one_run, check_participants_keys
+from tests.journals import raw
+from tests.pseudo_languages import RIGHT_TO_LEFT, write_pseudo_languages
 
 pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
@@ -58,6 +60,46 @@ def test_what_fires_a_train_does_not_end_it_and_what_pauses_or_halts_it_does(tmp
         (S.TRAIN, "P"),
         (S.TRAIN, "F12"),
     )
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "place", "name"),
+    [
+        ("Key_1", "1", 10, "1"),
+        ("Key_0", "0", 19, "0"),
+        ("Key_Ampersand", "&", 10, "1"),  # a French keyboard
+        ("Key_Eacute", "é", 11, "2"),
+        ("Key_F", "f", 41, "F"),
+        ("Key_Apostrophe", "'", 24, "#39"),  # where Q is on others
+        ("Key_unknown", "ф", 38, "A"),
+    ],
+)
+def test_a_key_is_a_digit_or_a_letter_by_what_it_types_or_where_it_lies(
+    key: str, text: str, place: int, name: str
+) -> None:
+    from PyQt6.QtCore import QEvent, Qt
+    from PyQt6.QtGui import QKeyEvent
+
+    from experiments.screens.console.windows import key_name
+
+    number = {"Key_Eacute": 0xC9}.get(key) or getattr(Qt.Key, key).value
+    no = Qt.KeyboardModifier.NoModifier
+    assert key_name(QKeyEvent(QEvent.Type.KeyPress, number, no, place, 0, 0, text)) == name
+
+
+def test_where_no_label_has_a_letter_a_to_z_answers_are_typed_as_digits(tmp_path: Path, display: str) -> None:
+    spoken = ["--language", RIGHT_TO_LEFT, "--catalogues", write_pseudo_languages(tmp_path / "own")]
+    command = ["run", "direction", "--screen", "console", "--participant", "P01", "--results", "results", *spoken]
+    with AtConsole(command, tmp_path, display) as screen:
+        screen.answer = lambda _: "2"
+        screen.to("preparing", trial=2)
+        screen.stop()
+    said = [
+        one["body"]
+        for one in raw(tmp_path / "results/sub-P01/sub-P01_task-direction_journal.jsonl")
+        if one["kind"] == "outcome"
+    ]
+    assert [body["value"] for body in said if body["kind"] == "answered"] == ["backward"]
 
 
 def test_letters_beside_the_field_of_a_rating_are_text_and_no_commands(tmp_path: Path, display: str) -> None:

@@ -206,6 +206,8 @@ _PLACES = {
     for place, letter in enumerate(row)
 }
 """Letters by X's number of their place on the keyboard, for alphabets that have others there."""
+_DIGITS = {10 + place: digit for place, digit in enumerate("1234567890")}
+"""As the letters, for keyboards that have digits with Shift alone."""
 
 
 class Hears(Protocol):
@@ -319,17 +321,22 @@ def _may_be_shortcut(event: QKeyEvent) -> bool:
     )
 
 
+_ASCII_END = 128
+
+
 def key_name(event: QKeyEvent) -> str:
-    """A key by the name that commands have: letters as capitals, by their place where the alphabet is another."""
+    """A key by the name that commands and answers have: digits, letters as capitals.
+
+    Both by their place on the keyboard, where that has something else there.
+    """
     key = event.key()
     named = _NAMES.get(QtCore.Qt.Key(key)) if key in set(_NAMES) else None
     if named is not None:
         return named
-    if QtCore.Qt.Key.Key_A <= key <= QtCore.Qt.Key.Key_Z:
+    if key < _ASCII_END and chr(key).isalnum():  # Qt's numbers of letters and digits are those of ASCII
         return chr(key)
-    if event.text().isalpha() and not event.text().isascii():
-        return _PLACES.get(event.nativeScanCode(), f"#{key}")
-    return f"#{key}"
+    place, is_letter = event.nativeScanCode(), event.text().isalpha() and not event.text().isascii()
+    return _DIGITS.get(place) or (_PLACES.get(place) if is_letter else None) or f"#{key}"
 
 
 RATE_Hz = 44_100
