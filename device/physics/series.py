@@ -184,11 +184,16 @@ def expand_creeping(p: Constants, s: ShotState, span: float, w: StepSeries) -> f
     clear(w.i)
     creep(p, s.u, s.heading, span, w)
     span = fitted_span(p, s, span, w)
-    for _ in range(_PASSES):
+    before = math.inf
+    for left in range(_PASSES - 1, -1, -1):
         if not 0.0 < span < math.inf:
             return 0.0
-        if creep(p, s.u, s.heading, span, w) <= _SETTLED:
+        change = creep(p, s.u, s.heading, span, w)
+        if change <= _SETTLED:
             return span
+        if change * min(change / before, 1.0) ** left > _SETTLED:
+            return 0.0  # each pass gains less than the one before it, so those that are left will not do
+        before = change
     return 0.0
 
 
