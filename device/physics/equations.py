@@ -23,7 +23,7 @@ HORIZON_S = 10.0
 """Where a shot that has not come to rest is given up."""
 MAX_SEGMENTS = 20_000
 """The most segments of one shot, steps and closed forms together; a plain shot has about 20."""
-MAX_WORK = 70_000
+MAX_WORK = 65_000
 """The most work of one shot: its segments, passes over series that settle, and pieces of steps in which roots are
 looked for. It takes about a second, interpreted; a plain shot has about 30."""
 

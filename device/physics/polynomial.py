@@ -110,12 +110,14 @@ def bernstein_over(w: StepSeries, low: float, high: float) -> None:
 
 
 def sign_changes(b: Coefficients) -> int:
-    """How often the coefficients change sign, zeros left out."""
+    """How often the coefficients change sign, zeros left out; 2 if more often."""
     changes, last = 0, 0.0
     for j in range(ORDER + 1):
         if b[j] * last < 0.0:
-            changes += 1
-        if b[j] != 0.0:
+            if changes == 1:
+                return 2
+            changes, last = 1, -last
+        elif last == 0.0 and b[j] != 0.0:
             last = math.copysign(1.0, b[j])
     return changes
 

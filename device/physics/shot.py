@@ -153,21 +153,20 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
 
 def rises_above(p: Constants, s: ShotState, w: StepSeries, best: float) -> bool:
     """Whether the force may rise above `best` within the step, by two bounds of its series, m (n + 1) v[n + 1]/span."""
-    even, odd = w.v[1], 0.0
-    for n in range(2, ORDER, 2):
-        even += n * max(w.v[n], 0.0)
-        odd += (n + 1) * max(w.v[n + 1], 0.0)
-    high, least = even + odd + ORDER * max(w.v[ORDER], 0.0), (best + _EQUAL * abs(best)) * s.span / p.mass
+    high, least = w.v[1], (best + _EQUAL * abs(best)) * s.span / p.mass
+    for n in range(2, ORDER + 1):
+        if w.v[n] > 0.0:
+            high += n * w.v[n]
     if not high > least:
         return False
     for n in range(ORDER):
         w.other[n] = (n + 1) * w.v[n + 1]
     w.other[ORDER] = 0.0
     bernstein_over(w, 0.0, s.used)
-    high = w.bernstein[0]
-    for n in range(1, ORDER + 1):
-        high = max(high, w.bernstein[n])
-    return high > least
+    for n in range(ORDER + 1):  # noqa: SIM110 - the compiler knows no generators
+        if w.bernstein[n] > least:
+            return True
+    return False
 
 
 def coast(p: Constants, s: ShotState, out: ShotResult) -> int:
