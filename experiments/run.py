@@ -93,7 +93,8 @@ class RunRequest:
     it. A `practice` is not analysed: it has files of its own and can be done again; nothing of a `training` is kept.
     `anew_reason` is why an unfinished run is set aside for a fresh one: for the register and the head of the new
     journal. At the console the participant may have `options` of their own, and a `visual` run is worked by a
-    synthetic one. `language` is the participant's; `catalogues` is where else there are languages.
+    synthetic one. `language` is the participant's; `catalogues` is where else there are languages. Of a synthetic
+    participant's run, which can be made again, records may be `synced_at_end`.
     """
 
     setup: Setup[DesignConfig]
@@ -112,6 +113,7 @@ class RunRequest:
     options: ParticipantOptions = ParticipantOptions()
     language: Language = ENGLISH
     catalogues: Path | None = None
+    synced_at_end: bool = False
 
     @property
     def simulated(self) -> bool:
@@ -122,6 +124,11 @@ class RunRequest:
     def participant_kind(self) -> ParticipantKind:
         """Who does the run, as the journal's head says it."""
         return "synthetic" if self.simulated else "person"
+
+    @property
+    def each_synced(self) -> bool:
+        """Whether each record is on the disk before the next step: always where a person takes part."""
+        return not (self.synced_at_end and self.simulated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,7 +171,10 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
         told: GrowingHistory = []
         session = design_session(plan, shown, told, request.language.messages)
         screen = make_screen(shown, plan, clock)
-        with _open_sensor(request, plan, stimuli, clock) as recorder, _open(place, before, clock) as journal:
+        with (
+            _open_sensor(request, plan, stimuli, clock) as recorder,
+            _open(place, before, clock, each=request.each_synced) as journal,
+        ):
             head = _circumstances(request, gun, clock)
             if before is None:
                 position = _begin(session, journal, request, plan, head)
@@ -344,15 +354,15 @@ def gone_on_with(request: RunRequest) -> RunRequest:
     return replace(request, language=ENGLISH if began is None else language(began.code, request.catalogues))
 
 
-def _open(place: Place, before: Contents | None, clock: Clock) -> Journal:
+def _open(place: Place, before: Contents | None, clock: Clock, *, each: bool) -> Journal:
     if before is not None:
         clock.go_on_after(before.records[-1].utc)
-        return Journal.reopen(before, clock)
+        return Journal.reopen(before, clock, each=each)
     try:
         storage.make_folder(place.folder)
     except OSError as error:
         raise PlaceError(f"{place.folder}: cannot be made ({error.strerror}); choose another --results") from error
-    return Journal.create(place.journal, clock)
+    return Journal.create(place.journal, clock, each=each)
 
 
 def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, object]:

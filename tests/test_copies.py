@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from analysis.report import copies as module
-from analysis.report.copies import Tell, cores, in_copy, process_copies
+from analysis.report.copies import cores, in_copy, process_copies
+from analysis.report.terminal import Tell
 from device.words import RecoilError
 from tests.waiting import wait_for
 

@@ -67,6 +67,26 @@ def test_every_record_tells_when_the_one_before_it_was_on_the_disk(path: Path) -
     assert [entry.synced_s for entry in others] == [entry.monotonic_s - 0.5 for entry in others]
 
 
+def test_what_is_synced_at_the_end_says_of_no_record_that_it_was(tmp_path: Path) -> None:
+    with Journal.create(tmp_path / "j", VirtualClock(), each=False) as journal:
+        journal.append("run", **HEAD)
+        journal.append("step", body=1)
+    first, second = read_journal(tmp_path / "j").records
+    assert (first.synced_s, second.synced_s) == (None, None)
+
+
+def test_a_disk_that_fails_at_the_end_is_told_with_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    journal = Journal.create(tmp_path / "j", VirtualClock(), each=False)
+    journal.append("run", **HEAD)
+    monkeypatch.setattr(storage, "sync", fails)
+    with pytest.raises(OSError, match="Input/output") as found:
+        journal.close()
+    assert found.value.filename == str(tmp_path / "j")
+
+
 def test_a_record_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
     with Journal.create(tmp_path / "j", VirtualClock()) as journal:
         journal.append("run", **HEAD)

@@ -19,9 +19,9 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
+from analysis.report.terminal import Tell, untold
 from device.words import RecoilError
 
-Tell = Callable[[str], object]
 Work = Callable[[Tell], object]
 """Is given somebody to tell of each part that is done."""
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -53,10 +53,6 @@ def process_copies() -> Iterator[None]:
         for copy in begun:
             copy.process.terminate()
             copy.process.join()
-
-
-def untold(part: str) -> None:
-    """Nobody waits."""
 
 
 def in_copy(work: Work, tell: Tell = untold) -> None:

@@ -146,9 +146,12 @@ class Journal:
     """A journal open for writing. Each `append` returns when the record is on the disk, or raises `JournalError`.
 
     A thread of its own writes, so that an interrupt, which reaches the main thread alone, never hits half a record.
+    Where `each` record is not synced, as nobody's answers are in it, all are when it is closed.
     """
 
-    def __init__(self, path: Path, descriptor: int, clock: Clock, before: Contents | None = None) -> None:
+    def __init__(
+        self, path: Path, descriptor: int, clock: Clock, before: Contents | None = None, *, each: bool = True
+    ) -> None:
         self.path = path
         self._descriptor = descriptor
         self._clock = clock
@@ -156,20 +159,21 @@ class Journal:
         self._length = before.whole_bytes if before else 0
         self._link = before.link if before else ""
         self._synced_s: float | None = None
+        self._each = each
         self._gone = ""
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
 
     @classmethod
-    def create(cls, path: Path, clock: Clock) -> Self:
+    def create(cls, path: Path, clock: Clock, *, each: bool = True) -> Self:
         """A new journal; its name is on the disk when this returns."""
         try:
             descriptor = storage.create(path)
         except OSError as error:
             raise JournalError(f"{path}: cannot be created ({error.strerror}); {_NOTHING}") from error
-        return cls(path, _held(path, descriptor), clock)
+        return cls(path, _held(path, descriptor), clock, each=each)
 
     @classmethod
-    def reopen(cls, contents: Contents, clock: Clock) -> Self:
+    def reopen(cls, contents: Contents, clock: Clock, *, each: bool = True) -> Self:
         """A journal to go on with: what was cut off, and so never acknowledged, is taken away first.
 
         `JournalError` if another run holds it, or wrote to it since `contents` was read.
@@ -182,7 +186,7 @@ class Journal:
         except BaseException:
             os.close(descriptor)
             raise
-        return cls(contents.path, descriptor, clock, contents)
+        return cls(contents.path, descriptor, clock, contents, each=each)
 
     def append(self, kind: Kind, **body: object) -> None:
         """Write one record and return when it is on the disk."""
@@ -199,13 +203,14 @@ class Journal:
         try:
             line = record_line({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record})
             storage.write_all(self._descriptor, line)
-            storage.sync(self._descriptor)
+            if self._each:
+                storage.sync(self._descriptor)
         except (OSError, ValueError) as error:
             self._take_back()
             reason = error.strerror if isinstance(error, OSError) else error
             safe = f"everything up to record {self._count - 1} is safe on the disk" if self._count else _NOTHING
             raise JournalError(f"{self.path}: record {self._count} cannot be written ({reason}); {safe}") from error
-        self._synced_s = self._clock.now()
+        self._synced_s = self._clock.now() if self._each else None
         self._count += 1
         self._length += len(line)
         self._link = link_of(line)
@@ -234,7 +239,12 @@ class Journal:
     def close(self) -> None:
         """Let go of the file, after what was submitted."""
         self._writer.shutdown()
-        os.close(self._descriptor)
+        try:
+            if not self._each:
+                with storage.errors_name(self.path):
+                    storage.sync(self._descriptor)
+        finally:
+            os.close(self._descriptor)
 
     def __enter__(self) -> Self:
         return self

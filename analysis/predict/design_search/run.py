@@ -46,7 +46,7 @@ from analysis.predict.design_search.space import (
 )
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import RunPieces, on_processes
-from analysis.report.copies import cores
+from analysis.report.copies import cores, process_copies
 from analysis.report.page import write_page
 from analysis.report.serial import as_csv, as_json
 from analysis.report.terminal import Progress
@@ -201,7 +201,9 @@ def _results(
 def _write(out: Path, found: DesignSearch, designs: Designs) -> None:
     storage.write_whole(out / "design.json", as_json(found))
     storage.write_whole(out / "designs.csv", as_csv(COLUMNS, (_cells(designs, place) for place in range(len(designs)))))
-    write_page(out, f"Design search: {found.title}", sections(found, designs, out / "figures"))
+    with process_copies():
+        parts = sections(found, designs, out / "figures")
+    write_page(out, f"Design search: {found.title}", parts)
 
 
 def _cells(designs: Designs, place: int) -> Sequence[object]:

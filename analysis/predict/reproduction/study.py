@@ -117,7 +117,9 @@ def _take_part(study: ReproducedStudy, setup: Setup[DesignConfig], code: str, re
     """Have a synthetic participant do an experiment, unless the logs hold it already."""
     where = folders.place(results, code, setup.config.experiment)
     if not _finished(where):
-        request = RunRequest(setup=setup, participant_id=code, results=results, seed=study.seed, again="resume")
+        request = RunRequest(
+            setup=setup, participant_id=code, results=results, seed=study.seed, again="resume", synced_at_end=True
+        )
         run(request, synthetic_screen, VirtualClock())
     elif not where.table.exists():  # killed between the last record and the table
         table, data, _ = rebuild(where.journal)
