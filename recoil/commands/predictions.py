@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer.core import TyperGroup
 
 from analysis.report import terminal
 from device.words import few_of_each
+
+if TYPE_CHECKING:
+    from analysis.predict.power.grid import PowerRequest
 
 ParticipantsOption = Annotated[str | None, typer.Option(metavar="N,N-N", help="How many people, such as 8,10,14-20.")]
 TrialsListOption = Annotated[
@@ -64,7 +67,7 @@ def power(
 
     Of a design with a threshold: by procedure and trials, how well it would be known.
     """
-    from analysis.predict.power import run as feature
+    from analysis.predict.power.grid import PowerRequest
     from analysis.predict.threshold_plan.run import procedures_of
     from experiments.config.door import ConfigError
 
@@ -75,7 +78,7 @@ def power(
     if config is not None and procedures_of(config):
         _check_only(ctx, f"{config} has a threshold", ("config", "trials", "studies", "seed", "out", "as_json"))
         return _of_threshold(config, trials, studies, seed, out, as_json)
-    request = feature.PowerRequest(
+    request = PowerRequest(
         config=config or "",
         participants=participants,
         trials=trials,
@@ -88,14 +91,30 @@ def power(
         paper=paper,
     )
     if shard is not None:
-        number = feature.shard_number(shard)
-        part = feature.power_shard(request, number, out, terminal.progress, workers=workers, scheduler=scheduler)
-        return terminal.show(part, feature.shard_in_short(part, out), as_json)
+        return _of_shard(request, shard, workers, scheduler, out, as_json)
+    return _of_studies(request, merge, workers, scheduler, out, as_json)
+
+
+def _of_shard(
+    request: PowerRequest, shard: str, workers: int | None, scheduler: str | None, out: Path, as_json: bool
+) -> None:
+    from analysis.predict.power import run as feature
+
+    number = feature.shard_number(shard)
+    part = feature.power_shard(request, number, out, terminal.progress, workers=workers, scheduler=scheduler)
+    terminal.show(part, feature.shard_in_short(part, out), as_json)
+
+
+def _of_studies(
+    request: PowerRequest, merge: Path | None, workers: int | None, scheduler: str | None, out: Path, as_json: bool
+) -> None:
+    from analysis.predict.power import run as feature
+
     if merge is None:
         found = feature.power(request, out, terminal.progress, workers, scheduler)
     else:
         found = feature.merged_power(merge, request, out)
-    return terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
 def _check_only(ctx: typer.Context, why: str, known: tuple[str, ...]) -> None:

@@ -177,49 +177,49 @@ def _cells(found: DesignSummary, levels: Mapping[str, Level]) -> tuple[str, ...]
 
 
 def _tables(asked: str, found: DesignSummary, of: Thresholds) -> Iterator[Table]:
-    digits, conditions = _digits(of), ("Condition",) if of.conditions[0].levels else ()
-    measure = _measure(of).capitalize()
-    groups = [(one, one.group) for one in of.conditions if one.group is not None]
-    if groups:
-        yield Table(
-            caption=f"{asked}: {_measure(of)} over people, in {factor_words(of.factor)}",
-            header=(
-                *conditions,
-                "People",
-                f"{measure}, mean",
-                "95 % interval",
-                "SD",
-                "JND",
-                "95 % interval",
-                "Without",
-            ),
-            rows=tuple(
-                (
-                    *_cells(found, one.levels),
-                    str(group.people),
-                    *_estimate(group.threshold, digits),
-                    apa.number(group.sd.median, digits),
-                    *_estimate(group.jnd, digits),
-                    str(group.without),
-                )
-                for one, group in groups
-            ),
-        )
+    digits = _digits(of)
+    if any(one.group is not None for one in of.conditions):
+        yield _groups(asked, found, of, digits)
     if of.differences:
-        yield Table(
-            caption=f"{asked}: differences of the {_measure(of)}; without correction for their number",
-            header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
-            rows=tuple(
-                (
-                    " − ".join(_condition(found, side).removesuffix(": ") for side in (one.a, one.b)),
-                    str(one.threshold.people),
-                    "yes" if one.threshold.within else "no",
-                    *_estimate(one.threshold.difference, digits),
-                )
-                for one in of.differences
-            ),
-        )
+        yield _differences(asked, found, of, digits)
     yield _people(asked, found, of, digits)
+
+
+def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
+    conditions = ("Condition",) if of.conditions[0].levels else ()
+    measured = f"{_measure(of).capitalize()}, mean", "95 % interval", "SD", "JND", "95 % interval"
+    return Table(
+        caption=f"{asked}: {_measure(of)} over people, in {factor_words(of.factor)}",
+        header=(*conditions, "People", *measured, "Without"),
+        rows=tuple(
+            (
+                *_cells(found, one.levels),
+                str(one.group.people),
+                *_estimate(one.group.threshold, digits),
+                apa.number(one.group.sd.median, digits),
+                *_estimate(one.group.jnd, digits),
+                str(one.group.without),
+            )
+            for one in of.conditions
+            if one.group is not None
+        ),
+    )
+
+
+def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
+    return Table(
+        caption=f"{asked}: differences of the {_measure(of)}; without correction for their number",
+        header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
+        rows=tuple(
+            (
+                " − ".join(_condition(found, side).removesuffix(": ") for side in (one.a, one.b)),
+                str(one.threshold.people),
+                "yes" if one.threshold.within else "no",
+                *_estimate(one.threshold.difference, digits),
+            )
+            for one in of.differences
+        ),
+    )
 
 
 def _people(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
