@@ -19,6 +19,7 @@ import pytest
 from hypothesis import settings
 
 from experiments.load import shipped_folder
+from experiments.record import storage
 from tests import figure_files, warm_start
 
 gc.disable()  # what is collected here stays: six thousand tests and all that they import, gone through again and again
@@ -52,6 +53,20 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     """Forget that place."""
     if not hasattr(config, "workerinput"):
         shutil.rmtree(os.environ[warm_start.FOLDER])
+
+
+@pytest.fixture
+def disk_that_fills(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fifth file that is written whole finds no room."""
+    written: list[Path] = []
+
+    def write(path: Path, data: bytes) -> None:
+        written.append(path)
+        if len(written) == 5:
+            raise OSError(28, "No space left on device")
+        path.write_bytes(data)
+
+    monkeypatch.setattr(storage, "write_whole", write)
 
 
 RECOIL = Path(sys.executable).with_name("recoil")

@@ -407,18 +407,8 @@ def test_what_is_there_is_never_overwritten(made: tuple[Path, Path, Archived], t
     assert tree(archive) == before
 
 
-def test_a_disk_that_fills_leaves_nothing(
-    made: tuple[Path, Path, Archived], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written: list[Path] = []
-
-    def full(path: Path, data: bytes) -> None:
-        written.append(path)
-        if len(written) == 5:
-            raise OSError(28, "No space left on device")
-        path.write_bytes(data)
-
-    monkeypatch.setattr(placing.storage, "write_whole", full)
+@pytest.mark.usefixtures("disk_that_fills")
+def test_a_disk_that_fills_leaves_nothing(made: tuple[Path, Path, Archived], tmp_path: Path) -> None:
     with pytest.raises(OSError, match="No space left"):
         archive_export.export_archive(ArchiveRequest(folder=made[0], out=tmp_path / "archive"))
     assert list(tmp_path.iterdir()) == []

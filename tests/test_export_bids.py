@@ -427,20 +427,12 @@ def test_where_two_names_cannot_be_exchanged_the_old_one_is_set_aside_first(
     assert "sub-P01" in (logs / "bids" / "participants.tsv").read_text()
 
 
-def test_a_disk_that_fills_leaves_the_earlier_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_fills_leaves_the_earlier_export(tmp_path: Path, request: pytest.FixtureRequest) -> None:
     logs = write_study(tmp_path / "logs", 1)
     feature.export(logs, logs / "bids")
     before = tree(logs)
     write_study(logs, 2)
-    written = []
-
-    def full(path: Path, data: bytes) -> None:
-        written.append(path)
-        if len(written) == 5:
-            raise OSError(28, "No space left on device")
-        path.write_bytes(data)
-
-    monkeypatch.setattr(placing.storage, "write_whole", full)
+    request.getfixturevalue("disk_that_fills")
     with pytest.raises(OSError, match="No space left"):
         feature.export(logs, logs / "bids")
     assert {path: data for path, data in tree(logs).items() if path.startswith(("bids", "."))} == {

@@ -26,13 +26,13 @@ def number(value: float | None, digits: int = 2) -> str:
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
 
 
-def below_one(value: float | None, digits: int = 2) -> str:
+def below_one(value: float | None) -> str:
     """A number that cannot pass 1, without a leading zero.
 
     >>> below_one(0.7351), below_one(1.0)
     ('.74', '1.00')
     """
-    return number(value, digits).removeprefix("0")
+    return number(value).removeprefix("0")
 
 
 def percent(share: float | None, digits: int = 1) -> str:

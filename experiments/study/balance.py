@@ -81,16 +81,14 @@ def used_rows(
     return [plan.order_row for plan in plans if plan.order_row is not None and plan.group == group]
 
 
-def unread(
-    setup: Setup[DesignConfig], results: Path, registered: Register, head_of: HeadOf = journal.head
-) -> tuple[str, ...]:
+def unread(setup: Setup[DesignConfig], results: Path, registered: Register) -> tuple[str, ...]:
     """Why the order of a next run cannot be balanced against some of the others: a line a journal that is unreadable.
 
     Nothing where orders are drawn at random.
     """
     if not planning.square_size(setup.config) and len(planning.groups(setup.config)) == 1:
         return ()
-    found = (_plan(path, head_of) for path in _counted(results, setup.config.experiment, registered))
+    found = (_plan(path, journal.head) for path in _counted(results, setup.config.experiment, registered))
     return tuple(f"{one}; its order does not count in the balance" for one in found if isinstance(one, JournalError))
 
 
