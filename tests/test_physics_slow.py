@@ -11,6 +11,7 @@ import pytest
 
 from device.physics import GunParameters, coil, segments, shot, simulate
 from device.physics.equations import DRIVE_CHANGE, FREE, HOME, NOT_HOME, TURN, ShotResult, ShotState, StepSeries, pack
+from device.physics.traces import energy_balance
 
 SHOTS = json.loads((Path(__file__).parent / "golden" / "physics_far.json").read_text(encoding="utf-8"))["shots"]
 
@@ -99,6 +100,13 @@ def test_a_magnet_that_rings_before_it_creeps_agrees_with_the_plain_series(emf, 
     for name in ("reset_end_s", "impact_speed_m_s", "firing_end_s", "max_displacement_m"):
         assert getattr(found, name) == pytest.approx(getattr(plain, name), rel=2e-12, abs=0.0), name
     assert units < 0.4 * plain_units
+
+
+@pytest.mark.parametrize("emf", RINGING)
+def test_energy_and_momentum_of_a_magnet_that_rings_add_up(emf):
+    audit = energy_balance(RINGING[emf])
+    assert abs(audit.residual_J) < 1e-12 * audit.supplied_J
+    assert abs(audit.residual_impulse_Ns) < 1e-10
 
 
 def test_a_magnet_that_the_coil_holds_at_the_end_of_its_force_is_little_work():

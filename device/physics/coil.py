@@ -116,7 +116,6 @@ def creeping_rate(p: Constants, s: ShotState, hold: float) -> float:
 _CREEPING = 0.02  # the magnet creeps if its position changes at most at this part of the rate at which the rest settles
 _LOOK_AGAIN = 20.0  # rings, in radians, or time constants besides the one of what fades, until the next look
 _APART = 1e-12  # relative: closer than this, speed and current are those that follow the position
-_FARTHEST = 0.01  # relative: farther apart, what is apart is no small part
 
 
 def until_next_look(p: Constants, hold: float) -> float:
@@ -157,7 +156,7 @@ def has_come_to_creep(p: Constants, s: ShotState, w: StepSeries, rate: float) ->
     slowest = min(how_long(min(s.x, ahead), abs(s.v)), how_long(1.0, rate))
     times, products = settling_rate(p, hold) * slowest, braking_rate(p, hold) * slowest
     gone = apart <= _APART * math.exp(min(fading_rate(p, hold) * soonest, 30.0))
-    return gone and apart <= min(0.1 * _APART * times * times, math.sqrt(_APART * products), _FARTHEST)
+    return gone and apart <= min(0.1 * _APART * times * times, math.sqrt(_APART * products), s.farthest)
 
 
 def span_from_where_it_goes(p: Constants, s: ShotState, w: StepSeries, span: float) -> float:

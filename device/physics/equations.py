@@ -27,6 +27,9 @@ MAX_WORK = 65_000
 """The most work of one shot: its segments, passes over series that settle, and pieces of steps in which roots are
 looked for. It takes about a second, interpreted; a plain shot has about 30."""
 
+FARTHEST = 1e-4
+"""How far apart, relative, speed and current may be from those that follow the position as they are taken for them."""
+
 FULL, NO_INDUCTANCE, CLOSED_FORM, BALLISTIC = range(4)
 """The models; those without inductance have L = 0 among their constants."""
 MODELS = {"full": FULL, "no-inductance": NO_INDUCTANCE, "closed-form": CLOSED_FORM, "ballistic": BALLISTIC}
@@ -105,6 +108,7 @@ class ShotState:
     transient_until: float = 0.0  # from then on the current only follows the motion
     creeping: bool = False  # whether speed and current follow the position
     creeping_from: float = 0.0  # when to look next whether they do
+    farthest: float = FARTHEST  # a trace, in which nothing may jump, has less
     until: float = HORIZON_S
 
 

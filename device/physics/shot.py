@@ -21,6 +21,7 @@ from device.physics.equations import (
     COIL,
     COIL_EDGE,
     DRIVE_CHANGE,
+    FARTHEST,
     FORCE_ZERO,
     GIVEN_UP,
     HOME,
@@ -65,7 +66,7 @@ _NARROWEST = 1e-6  # of a step: no two peaks of the force lie closer
 
 def shoot(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None:
     """One shot from rest into `out`."""
-    s.x, s.v, s.i, s.until = 0.0, 0.0, 0.0, HORIZON_S
+    s.x, s.v, s.i, s.until, s.farthest = 0.0, 0.0, 0.0, HORIZON_S, FARTHEST
     shoot_on(p, s, w, out)
 
 

@@ -52,6 +52,7 @@ from device.physics.segments import (
 from device.physics.shot import ShotSummary, simulate
 
 _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoil stage
+_FARTHEST = 1e-11  # relative: how far speed may jump where a ring is left
 _REST_AFTER_S = 0.010  # shown after the last motion
 
 
@@ -108,7 +109,7 @@ class Segment:
 
 def segments(constants: Constants) -> Iterator[Segment]:
     """The segments of one shot from rest, in order; the last one is settled for good, or given up."""
-    s, w = ShotState(), StepSeries()
+    s, w = ShotState(farthest=_FARTHEST), StepSeries()
     pulse_on(constants, s)
     enter(constants, s, BREAK_AWAY)
     for _ in range(MAX_SEGMENTS):
