@@ -6,6 +6,7 @@ import json
 import re
 import runpy
 from dataclasses import fields, replace
+from gettext import NullTranslations
 from io import StringIO
 from pathlib import Path
 
@@ -41,6 +42,7 @@ from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.load import load_setup
 from experiments.record.journal import read_journal
 from experiments.run import RunRequest, gone_on_with, run
+from experiments.screens import phrases as phrases_of_the_console
 from experiments.screens import texts
 from experiments.screens.participant import messages as wire
 from experiments.screens.synthetic import synthetic_screen
@@ -110,6 +112,65 @@ def test_no_sentence_of_the_participants_pages_stands_outside_the_messages():
 
 
 _DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
+COMMANDS_AND_STATES = {"go on", "end break", "no answer", "in progress", "not begun", "emergency stop", "test shot"}
+NOT_SHOWN = {
+    *COMMANDS_AND_STATES,
+    *("participant again", "line of text"),
+    *("Recoil – please wait", "Recoil – unfinished run"),
+    "the participant's screen did not start again: {}",  # why a run stopped: in its journal
+    "{} QLabel { font-size: 26px; padding: 40px; }",
+}
+"""Names of commands, states, threads, fields and windows; what a journal has; how things look."""
+OF_THE_PROGRAM = ("app.py", "windows.py", "visual_participant.py")
+"""What these say is for the terminal or the journal."""
+CONSOLE = [*sorted((ROOM / "screens" / "console").glob("*.py")), ROOM / "screens" / "texts.py"]
+
+
+def phrases(tree):
+    """The calls that a catalogue could translate."""
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
+    return [call for call in calls if call.func.id == "phrase"]
+
+
+def sentences(tree):
+    """What two words in a row say, a value counting as one, outside of phrases and of documentation."""
+    apart = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    parts = [*phrases(tree), *(node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr))]
+    apart |= {id(inner) for one in parts for inner in ast.iter_child_nodes(one)}
+    for node in ast.walk(tree):
+        said = node.values if isinstance(node, ast.JoinedStr) else [node]
+        if id(node) not in apart and all(isinstance(one, ast.FormattedValue | ast.Constant) for one in said):
+            text = "".join(str(one.value) if isinstance(one, ast.Constant) else "{}" for one in said)
+            if re.search(r"[A-Za-z]{2,} ([A-Za-z]{2,}|{})|{} [A-Za-z]{2,}", text) and not text.startswith("--"):
+                yield text
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in CONSOLE if path.name not in OF_THE_PROGRAM], ids=lambda path: path.stem
+)
+def test_every_sentence_of_the_console_is_a_phrase_with_its_values_by_name(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert set(sentences(tree)) <= NOT_SHOWN
+    for call in phrases(tree):
+        given, (text,) = sorted(one.arg for one in call.keywords), call.args
+        names = sorted({name.split(":")[0] for name in placeholders(text.value)})
+        assert given in ([], names), text.value  # without any, they are filled in later
+
+
+class Pseudo(NullTranslations):
+    """Says that it was asked."""
+
+    def gettext(self, message):
+        return f"[{message}]"
+
+
+def test_a_catalogue_would_translate_what_the_console_says_and_leave_its_values(monkeypatch):
+    plan = plan_of(load_setup("direction").config, "P01", 1)
+    plain = texts.place_text(plan, plan.trials[0])
+    monkeypatch.setattr(phrases_of_the_console, "CATALOGUE", Pseudo())
+    assert texts.place_text(plan, plan.trials[0]) == "[[Trial 1 of 20] · set 1 of 4 · session 1 of 3]"
+    assert texts.shots_text(2) == "[2 shots]"
+    assert plain == "Trial 1 of 20 · set 1 of 4 · session 1 of 3"
 
 
 def test_a_message_that_a_page_does_not_use_is_in_no_catalogue():

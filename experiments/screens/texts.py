@@ -10,13 +10,14 @@ import unicodedata
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.design.language import LARGEST_NUMBER, shown_level
 from experiments.design.plan import Plan, Trial
+from experiments.screens.phrases import phrase
 from experiments.session import remarks, steps
 from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
 from experiments.tasks.questions import AnswerValue
 
-FLAG_RULE = f"A flag is a word of at most {MAX_FLAG} letters, digits and hyphens."
+FLAG_RULE = phrase("A flag is a word of at most {max_flag} letters, digits and hyphens.", max_flag=MAX_FLAG)
 
 
 def ordinal(plan: Plan, trial: Trial, messages: ParticipantMessages = ENGLISH_MESSAGES) -> str:
@@ -37,12 +38,21 @@ def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
 def place_text(plan: Plan, trial: Trial) -> str:
     """Where a trial stands: in its session, set and run."""
     in_session = [other for other in plan.trials if other.session == trial.session]
-    where = f"Trial {trial.trial} of {_at_most(plan)}{len(in_session)}"
+    where = phrase(
+        "Trial {trial} of {at_most}{in_session}", trial=trial.trial, at_most=_at_most(plan), in_session=len(in_session)
+    )
     sessions, sets = plan.trials[-1].session, in_session[-1].set
     return (
         where
         if sessions == sets == 1
-        else f"{where} · set {trial.set} of {sets} · session {trial.session} of {sessions}"
+        else phrase(
+            "{where} · set {set} of {sets} · session {session} of {sessions}",
+            where=where,
+            set=trial.set,
+            sets=sets,
+            session=trial.session,
+            sessions=sessions,
+        )
     )
 
 
@@ -51,11 +61,17 @@ def track_text(plan: Plan, told: History, trial: Trial) -> str:
     if not trial.track:
         return ""
     own = {other for other in plan.trials if other.track == trial.track}
-    return f"Track {trial.track}: {len(answered(told) & own)} of {_at_most(plan)}{len(own)} trials"
+    return phrase(
+        "Track {track}: {answered} of {at_most}{own} trials",
+        track=trial.track,
+        answered=len(answered(told) & own),
+        at_most=_at_most(plan),
+        own=len(own),
+    )
 
 
 def _at_most(plan: Plan) -> str:
-    return "at most " if plan.may_end_early else ""
+    return phrase("at most ") if plan.may_end_early else ""
 
 
 def chosen_text(told: History, trial: Trial) -> str:
@@ -68,20 +84,21 @@ def chosen_text(told: History, trial: Trial) -> str:
 def short_place(trial: Trial, here: Trial) -> str:
     """Where a trial stands that is looked at from another: its set and session are named where they differ."""
     if of_one_set(trial, here):
-        return f"trial {trial.trial}"
-    session = "" if trial.session == here.session else f", session {trial.session}"
-    return f"trial {trial.trial} of set {trial.set}{session}"
+        return phrase("trial {trial}", trial=trial.trial)
+    session = "" if trial.session == here.session else phrase(", session {session}", session=trial.session)
+    return phrase("trial {trial} of set {set}{session}", trial=trial.trial, set=trial.set, session=session)
 
 
 def again_text(told: History, step: Prepare) -> str:
     """How often a trial was felt before this attempt, as the table counts attempts; empty if never."""
     felt = sum(is_attempt(one, word) for one, word in told if trial_of(one) == step.trial)
     before = felt - (step.interval > 0)  # the first shot of this one is among them
-    return f"Presented again, for the {_nth(before + 1)} time." if before else ""
+    return phrase("Presented again, for the {nth} time.", nth=_nth(before + 1)) if before else ""
 
 
 def _nth(number: int) -> str:
-    return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
+    named = {1: phrase("first"), 2: phrase("second"), 3: phrase("third")}
+    return named.get(number, phrase("{number}th", number=number))
 
 
 def settings_text(step: Prepare) -> str:
@@ -92,22 +109,28 @@ def settings_text(step: Prepare) -> str:
 def turn_text(step: Prepare) -> str:
     """Which way the gun is turned, and for which of several shots."""
     count = len(step.trial.intervals)
-    which = f" for shot {step.interval + 1} of {count}" if count and step.interval else ""
-    return f"Turn the gun to {step.trial.direction_at(step.interval).upper()}{which}"
+    which = (
+        phrase(" for shot {interval} of {count}", interval=step.interval + 1, count=count)
+        if count and step.interval
+        else ""
+    )
+    return phrase(
+        "Turn the gun to {direction}{which}", direction=step.trial.direction_at(step.interval).upper(), which=which
+    )
 
 
 def read_out_text(plan: Plan, step: Prepare) -> str:
     """What the participant is told: to be read out before a set, and as a reminder at its other trials."""
     if not step.instruction:
         return ""
-    how = "READ OUT" if plan.opens_set(step.trial) else "Instruction of this set"
+    how = phrase("READ OUT") if plan.opens_set(step.trial) else phrase("Instruction of this set")
     return f"\n  {how}: “{step.instruction}”"
 
 
 def value_text(asked: Asking, said: AnswerValue) -> str:
     """What was entered, as text."""
     if said is None:
-        return "no answer"
+        return phrase("no answer")
     if isinstance(said, float):
         return f"{said:g}"
     return asked.label(said).upper() if isinstance(asked, Ask) else f"“{said}”"
@@ -117,9 +140,9 @@ def ends_text(asked: Rate) -> str:
     """The ends of a scale in words, or which numbers may be said."""
     if asked.minimum_text or asked.maximum_text:
         return f"{asked.minimum:g} = {asked.minimum_text}     {asked.maximum:g} = {asked.maximum_text}"
-    low = "above 0" if 0 < asked.minimum <= _TINY else f"from {asked.minimum:g}"
+    low = "above 0" if 0 < asked.minimum <= _TINY else phrase("from {minimum:g}", minimum=asked.minimum)
     low = "" if asked.minimum <= -LARGEST_NUMBER else low
-    high = "" if asked.maximum >= LARGEST_NUMBER else f"to {asked.maximum:g}"
+    high = "" if asked.maximum >= LARGEST_NUMBER else phrase("to {maximum:g}", maximum=asked.maximum)
     return " ".join(filter(None, ("a number", low, high)))
 
 
@@ -129,7 +152,7 @@ _TINY = 1e-6
 
 def about_text(plan: Plan, asked: Asking, messages: ParticipantMessages = ENGLISH_MESSAGES) -> str:
     """What was asked about: the trial, or a stimulus by its order of presentation."""
-    return ordinal(plan, asked.trial, messages) if asked.later else f"Trial {asked.trial.trial}"
+    return ordinal(plan, asked.trial, messages) if asked.later else phrase("Trial {trial}", trial=asked.trial.trial)
 
 
 def entry_text(plan: Plan, told: History, entry: Asking) -> str:
@@ -143,8 +166,11 @@ def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
     """That something was corrected, and to what; of words only that they were."""
     entry = asked_before(told, remark)
     if entry is None or isinstance(entry, Describe):
-        return "description corrected"
-    return f"{'' if isinstance(entry, Ask) else f'{what(entry)} '}corrected to {value_text(entry, remark.value)}"
+        return phrase("description corrected")
+    value = value_text(entry, remark.value)
+    if isinstance(entry, Ask):
+        return phrase("corrected to {value}", value=value)
+    return phrase("{entry} corrected to {value}", entry=what(entry), value=value)
 
 
 def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Remark) -> str:
@@ -152,19 +178,25 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
     trial = trial_of(step)
     match word:
         case steps.Repeated():
-            return f"Saved. Trial {word.trial.trial} is presented again ({word.reason})."
+            return phrase(
+                "Saved. Trial {trial} is presented again ({reason}).", trial=word.trial.trial, reason=word.reason
+            )
         case steps.Rested():
-            return "The break is over."
+            return phrase("The break is over.")
         case _ if trial is None:
             return _remark_text(plan, told, word)
         case steps.Answered() if isinstance(step, Asking):
-            return f"Saved. {_entered_text(plan, step, word.value)}."
+            return phrase("Saved. {entered}.", entered=_entered_text(plan, step, word.value))
         case steps.Presented():
-            return f"Presented and saved. {shots_text(word.shots)}, {word.exposure_s:.1f} s."
+            return phrase(
+                "Presented and saved. {shots}, {exposure_s:.1f} s.",
+                shots=shots_text(word.shots),
+                exposure_s=word.exposure_s,
+            )
         case steps.Failed():
-            return f"The gun failed: {word.cause}. The trial is marked and presented again."
+            return phrase("The gun failed: {cause}. The trial is marked and presented again.", cause=word.cause)
         case steps.Interrupted():
-            return "The pause ended the stimulus: its trial is presented again." if word.presented else ""
+            return phrase("The pause ended the stimulus: its trial is presented again.") if word.presented else ""
         case _:
             return ""
 
@@ -179,13 +211,17 @@ def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:
         case remarks.EntryCorrected():
             return _corrected_text(plan, told, remark)
         case remarks.Flagged():
-            return f"Saved. Trial {remark.trial.trial} flagged {remark.flag}."
+            return phrase("Saved. Trial {trial} flagged {flag}.", trial=remark.trial.trial, flag=remark.flag)
         case remarks.Noted(trial=Trial()):  # one without a trial is the program's own
-            return "Saved. Note."
+            return phrase("Saved. Note.")
         case remarks.HaltReason():
-            return "Saved. Reason of the emergency stop."
+            return phrase("Saved. Reason of the emergency stop.")
         case remarks.TestShot():
-            return f"Test shot failed: {remark.cause}." if remark.cause else "The test shot was fired; the run goes on."
+            return (
+                phrase("Test shot failed: {cause}.", cause=remark.cause)
+                if remark.cause
+                else phrase("The test shot was fired; the run goes on.")
+            )
         case _:
             return ""
 
@@ -196,8 +232,8 @@ def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -
         return ""
     about = about_text(plan, entry)
     if isinstance(entry, Describe):
-        return f"Saved. {about}: description corrected."
-    return f"Saved. {about} corrected to {value_text(entry, remark.value)}."
+        return phrase("Saved. {about}: description corrected.", about=about)
+    return phrase("Saved. {about} corrected to {value}.", about=about, value=value_text(entry, remark.value))
 
 
 def shots_text(count: int) -> str:
@@ -206,7 +242,7 @@ def shots_text(count: int) -> str:
     >>> shots_text(1), shots_text(2)
     ('1 shot', '2 shots')
     """
-    return f"{count} shot{'' if count == 1 else 's'}"
+    return phrase("1 shot") if count == 1 else phrase("{count} shots", count=count)
 
 
 def duration_text(seconds: float) -> str:
@@ -216,7 +252,7 @@ def duration_text(seconds: float) -> str:
     ('45 s', '10 min', '1 min 30 s')
     """
     minutes, rest = divmod(round(seconds), 60)
-    parts = [f"{minutes} min"] * (minutes > 0) + [f"{rest} s"] * (rest > 0 or not minutes)
+    parts = [phrase("{minutes} min", minutes=minutes)] * (minutes > 0) + [f"{rest} s"] * (rest > 0 or not minutes)
     return " ".join(parts)
 
 

@@ -12,6 +12,7 @@ from PyQt6.QtGui import QMouseEvent
 
 from experiments.screens.console import widgets
 from experiments.screens.console.keys import ANSWERS, BY_NAME, Name, choices_at, field_at, shown_key
+from experiments.screens.phrases import phrase
 from experiments.session.events import Press
 from experiments.session.states import Position, State
 from experiments.session.steps import Rate
@@ -165,12 +166,14 @@ class Buttons:
             self._answers[0].put(choices, range(half))
             self._answers[1].put(choices, range(half, len(choices)))
         for name, button in self._large.items():
-            enters = "It was told" if position.state is State.INFORMING else "End the run"
+            enters = phrase("It was told") if position.state is State.INFORMING else phrase("End the run")
             button.label(enters if name == "enter" else "", letters=letters)
         for name, button in self._row.items():
             held = name == "pause" and position.state is State.PAUSED
             button.name = "go on" if held else name
-            button.label("Close" if name == "stop" and closes else "", letters=letters, choices=choices if asks else ())
+            button.label(
+                phrase("Close") if name == "stop" and closes else "", letters=letters, choices=choices if asks else ()
+            )
             dim = "yes" if idle(button.name) else "no"
             if button.property("dim") != dim:
                 button.setProperty("dim", dim)

@@ -13,6 +13,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
 from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.phrases import phrase
 from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
@@ -154,13 +155,13 @@ class Controls:
             self._run_again()
         elif self.drawn.state is State.REARMING and self._held is None:
             self._held = press
-            self._view.say("Hold it …", "wait")
+            self._view.say(phrase("Hold it …"), "wait")
 
     def let_go(self) -> None:
         """It was let go."""
         if self._held is not None:
             self._held = None
-            self._view.say(f"Let go too soon: hold it for {REARM_HELD_S:g} s.", "wait")
+            self._view.say(phrase("Let go too soon: hold it for {held_s:g} s.", held_s=REARM_HELD_S), "wait")
 
     def tick(self, *, here: bool = True) -> None:
         """Look whether it was held for long enough, and whether a line or a page takes what is typed `here`."""
@@ -194,13 +195,13 @@ class Controls:
     def _run_again(self) -> None:
         """A key that is not for a page takes it away, and does nothing else: what it does was not to be seen."""
         self.uncover()
-        self._view.say("Here is the run again: press again.", "wait")
+        self._view.say(phrase("Here is the run again: press again."), "wait")
 
     def _after_end(self, name: keys.Name) -> None:
         if name == "stop":
             self._view.close()
         else:
-            self._view.say("The run has ended: Q closes the window.", "wait")
+            self._view.say(phrase("The run has ended: Q closes the window."), "wait")
 
     def _run(self, name: keys.Name, press: Press) -> None:
         self.uncover()
@@ -228,7 +229,7 @@ class Controls:
         if name in ("help", "list", "theme"):
             return ""
         if self.ended:
-            return "" if name == "stop" else "The run has ended."
+            return "" if name == "stop" else phrase("The run has ended.")
         if name == "enter":
             return "" if self.typing.letters else keys.why_not(name, self.drawn)
         if name == "leave" and (self._enter is not None or self.page):
@@ -239,8 +240,8 @@ class Controls:
 
     def _no_restart(self) -> str:
         if self._participant is None or not self._participant.lost:
-            return "The participant's screen is not lost."
-        return "" if self.drawn.state is State.PAUSED else "Pause first: a new window takes the keys."
+            return phrase("The participant's screen is not lost.")
+        return "" if self.drawn.state is State.PAUSED else phrase("Pause first: a new window takes the keys.")
 
     def _restart(self) -> None:
         refused = self._no_restart()
@@ -251,9 +252,9 @@ class Controls:
 
     def _nothing_to(self, name: keys.Name) -> str:
         if name == "repeat" and self._live.moment.repeatable is None:
-            return "There is no trial of this set to repeat now."
+            return phrase("There is no trial of this set to repeat now.")
         if name == "undo" and self._live.moment.further_back is None:
-            return "There is nothing to undo in this set."
+            return phrase("There is nothing to undo in this set.")
         return ""
 
     # what is entered
@@ -306,7 +307,10 @@ class Controls:
             return
         rating = typed_number(typed, scale.minimum, scale.maximum)
         if rating is None:
-            self._view.say(f"Not a rating: type a number from {scale.minimum:g} to {scale.maximum:g}.", "bad")
+            said = phrase(
+                "Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum
+            )
+            self._view.say(said, "bad")
         else:
             self._rate(rating, press)
 
@@ -332,7 +336,9 @@ class Controls:
             moment = self._live.moment
             trial = (moment.repeatable if name == "repeat" else None) or moment.trial
             self._enter = lambda line, press: self._line(name, trial, line, press)
-            self._view.open_line(f"{_question(name, trial, self._live)}  (Enter saves, Esc leaves it)")
+            self._view.open_line(
+                phrase("{question}  (Enter saves, Esc leaves it)", question=_question(name, trial, self._live))
+            )
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to close the window of a live run."""
@@ -341,7 +347,7 @@ class Controls:
     def _enter_line(self, press: Press) -> None:
         text, enter = typed_line(self._view.typed("line")), self._enter
         if not text:
-            self._view.say("Type a word or two, or leave it with Esc.", "bad")
+            self._view.say(phrase("Type a word or two, or leave it with Esc."), "bad")
         elif enter is not None and enter(text, press):
             self._close_line()
 
@@ -360,7 +366,9 @@ class Controls:
             self._say(verdict)
             return True
         kept = self._live.offer(_as_note(name, trial, text))
-        self._view.say(f"{verdict.text} What you typed is kept as a note." if kept else verdict.text, "wait")
+        self._view.say(
+            phrase("{text} What you typed is kept as a note.", text=verdict.text) if kept else verdict.text, "wait"
+        )
         return bool(kept)
 
     # what belongs to the window
@@ -389,7 +397,7 @@ class Controls:
         if page == "list":
             self._view.show_list()
         else:
-            self._view.show_page("Keys, and what each does now. Esc leaves this page.", self.help_lines())
+            self._view.show_page(phrase("Keys, and what each does now. Esc leaves this page."), self.help_lines())
 
     def help_lines(self) -> list[str]:
         """Every key, what it does, and why it does nothing now."""
@@ -399,20 +407,22 @@ class Controls:
     def _help_line(self, name: keys.Name) -> str:
         not_now = self.idle(name)
         key = keys.shown_key(name, letters=self.typing.letters, choices=self.choices)
-        answer = name in keys.ANSWERS
-        does = f"enters {self.choices[keys.ANSWERS.index(name)].label}" if answer else keys.BY_NAME[name].does
-        return f"{key:<8} {does}{f'   – not now: {not_now}' if not_now else ''}"
+        does = keys.BY_NAME[name].does
+        if name in keys.ANSWERS:
+            does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].label)
+        not_done = phrase("   – not now: {because}", because=not_now) if not_now else ""
+        return f"{key:<8} {does}{not_done}"
 
 
 # the lines that are typed for a command: what is asked, and which event comes of it
 
 _QUESTIONS: dict[keys.Name, str] = {
-    "end break": "Why does the break end early?",
-    "repeat": "Why is trial {trial} to be presented again?",
-    "flag": "Flag {place} as (a word such as noise or late)",
-    "note": "Note on {place}",
-    "reason": "Why was there an emergency stop?",
-    "stop": "Why does the run stop here? It can be resumed.",
+    "end break": phrase("Why does the break end early?"),
+    "repeat": phrase("Why is trial {trial} to be presented again?"),
+    "flag": phrase("Flag {place} as (a word such as noise or late)"),
+    "note": phrase("Note on {place}"),
+    "reason": phrase("Why was there an emergency stop?"),
+    "stop": phrase("Why does the run stop here? It can be resumed."),
 }
 
 

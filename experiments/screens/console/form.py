@@ -16,15 +16,16 @@ from experiments.run import ParticipantOptions
 from experiments.screens.console import widgets
 from experiments.screens.console.people import cell_text, note_text
 from experiments.screens.console.widgets import LineEdit, ListBox, TextLines, TickBox
+from experiments.screens.phrases import phrase
 from experiments.study.enrolment import Entered, typed_facts
 from experiments.study.study import Participant
 
 _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_args(Handedness)}
-_FACT_TEXT = {"age_years": "Age in years", "sex": "Sex", "handedness": "Handedness"}
-_HOW_TO_START = "Read the code back with the participant, fill in what is asked, then Start."
+_FACT_TEXT = {"age_years": phrase("Age in years"), "sex": phrase("Sex"), "handedness": phrase("Handedness")}
+_HOW_TO_START = phrase("Read the code back with the participant, fill in what is asked, then Start.")
 _AGE_DIGITS = 3
-SENDS_MARKERS = "sends markers (LSL)"
-_NO_SENSOR = "none; csv:PATH or another"
+SENDS_MARKERS = phrase("sends markers (LSL)")
+_NO_SENSOR = phrase("none; csv:PATH or another")
 
 
 class Form(QtWidgets.QFrame):
@@ -42,8 +43,11 @@ class Form(QtWidgets.QFrame):
         self.setObjectName("panel")
         self.experiment, self.code, self.code_again = ListBox(experiments), LineEdit(), LineEdit()
         self.facts: dict[str, LineEdit | ListBox] = {fact: _fact(fact) for fact in asked}
-        self.own_screen, self.own_keys = TickBox("rates on their own screen"), TickBox("answers with own keys")
-        self.noise, self.monitor = TickBox("hears masking noise"), ListBox(monitors())
+        self.own_screen, self.own_keys = (
+            TickBox(phrase("rates on their own screen")),
+            TickBox(phrase("answers with own keys")),
+        )
+        self.noise, self.monitor = TickBox(phrase("hears masking noise")), ListBox(monitors())
         self.sensor, self.markers = LineEdit(), TickBox(SENDS_MARKERS)
         self.remark = TextLines("remark")
         self._typed: dict[str, str] | None = None
@@ -72,13 +76,16 @@ class Form(QtWidgets.QFrame):
         widgets.fill(QtWidgets.QVBoxLayout(self), how, self.remark, (scroll, 1), margins=None)
 
     def _rows(self) -> list[tuple[str, QtWidgets.QWidget]]:
-        rows: list[tuple[str, QtWidgets.QWidget]] = [("Experiment", self.experiment), ("Code", self.code)]
-        rows += [("Code, read back", self.code_again)]
+        rows: list[tuple[str, QtWidgets.QWidget]] = [
+            (phrase("Experiment"), self.experiment),
+            (phrase("Code"), self.code),
+        ]
+        rows += [(phrase("Code, read back"), self.code_again)]
         rows += [(_FACT_TEXT[fact], widget) for fact, widget in self.facts.items()]
-        rows += [("Participant", self.own_screen), ("", self.own_keys), ("", self.noise)]
-        rows += [("Their language", self.languages)] if len(self._languages) > 1 else []
-        rows += [("Their monitor", self.monitor)] if self.monitor.count() > 1 else []
-        return [*rows, ("The run", self.markers), ("Sensor", self.sensor)]
+        rows += [(phrase("Participant"), self.own_screen), ("", self.own_keys), ("", self.noise)]
+        rows += [(phrase("Their language"), self.languages)] if len(self._languages) > 1 else []
+        rows += [(phrase("Their monitor"), self.monitor)] if self.monitor.count() > 1 else []
+        return [*rows, (phrase("The run"), self.markers), (phrase("Sensor"), self.sensor)]
 
     def _connect(self) -> None:
         for line in (self.code, self.code_again, self.sensor, *self.facts.values()):
@@ -201,7 +208,7 @@ class PeopleTable(QtWidgets.QTableWidget):
 
     def __init__(self, experiments: Sequence[str]) -> None:
         super().__init__()
-        columns = ["code", *experiments, "note"]
+        columns = [phrase("code"), *experiments, phrase("note")]
         self.setColumnCount(len(columns))
         self.setHorizontalHeaderLabels(columns)
         self.setEditTriggers(QtWidgets.QTableWidget.EditTrigger.NoEditTriggers)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from experiments.design.language import QuestionConfig
+from experiments.screens.phrases import phrase
 from experiments.session import events
 from experiments.session.events import Event
 from experiments.session.states import No, Position, State, change_of
@@ -76,40 +77,96 @@ ANSWERS: tuple[Name, ...] = get_args(_Answer)
 
 _C = KeyCommand
 KEY_COMMANDS: tuple[KeyCommand, ...] = (
-    _C(name="emergency", key="F12", text="EMERGENCY STOP", does="disarms; fires no more", kind=events.EmergencyStop),
-    _C(name="fire", key="Space", text="Fire", does="fires, when the gun is handed over", kind=events.Fire),
-    _C(name="next", key="Space", text="“Next” was said", does="ends the train", kind=events.Next),
+    _C(
+        name="emergency",
+        key="F12",
+        text=phrase("EMERGENCY STOP"),
+        does=phrase("disarms; fires no more"),
+        kind=events.EmergencyStop,
+    ),
+    _C(
+        name="fire",
+        key="Space",
+        text=phrase("Fire"),
+        does=phrase("fires, when the gun is handed over"),
+        kind=events.Fire,
+    ),
+    _C(name="next", key="Space", text=phrase("“Next” was said"), does=phrase("ends the train"), kind=events.Next),
     _C(
         name="damper",
         key="M",
-        text="It is set",
-        does="says that what is set by hand is set",
+        text=phrase("It is set"),
+        does=phrase("says that what is set by hand is set"),
         kind=events.DamperSet,
     ),
-    *(_C(name=name, key="", text="", does="enters an answer", kind=events.Answer) for name in ANSWERS),
+    *(_C(name=name, key="", text="", does=phrase("enters an answer"), kind=events.Answer) for name in ANSWERS),
     _C(
         name="enter",
         key="Enter",
         text="Enter",
-        does="enters what is typed; at the end, ends the run",
+        does=phrase("enters what is typed; at the end, ends the run"),
         kind=events.Finish,
     ),
-    _C(name="no answer", key="Ctrl+X", text="No answer", does="enters that there is no rating", kind=events.Rating),
-    _C(name="end break", key="E", text="End the break…", does="ends a break early, for a reason", kind=events.EndBreak),
-    _C(name="rearm", key="T", text="Hold T: test shot", does="held for 1 s: a test shot", kind=events.Rearm),
-    _C(name="pause", key="P", text="Pause", does="holds everything; again, goes on", kind=events.Pause),
-    _C(name="go on", key="P", text="Go on", does="goes on after a pause", kind=events.GoOn),
-    _C(name="undo", key="U", text="Undo", does="opens the last entry, then the one before", kind=events.Undo),
-    _C(name="leave", key="Esc", text="Leave", does="leaves a field or a correction; never stops", kind=events.Leave),
-    _C(name="repeat", key="R", text="Repeat…", does="presents the trial again, for a reason", kind=events.Repeat),
-    _C(name="flag", key="G", text="Flag…", does="marks the trial with a word", kind=events.Flag),
-    _C(name="note", key="N", text="Note…", does="writes a note on the trial", kind=events.Note),
-    _C(name="reason", key="Y", text="Say why…", does="says why there was an emergency stop", kind=events.Reason),
-    _C(name="stop", key="Q", text="Stop…", does="stops the run, which can be resumed", kind=events.Stop),
-    _C(name="restart", key="S", text="Start it again", does="starts the participant's screen again"),
-    _C(name="list", key="L", text="List", does="lists flags, notes and corrections of the set"),
-    _C(name="help", key="F1", text="Keys", does="shows this page"),
-    _C(name="theme", key="F2", text="Dark/light", does="changes the colours"),
+    _C(
+        name="no answer",
+        key="Ctrl+X",
+        text=phrase("No answer"),
+        does=phrase("enters that there is no rating"),
+        kind=events.Rating,
+    ),
+    _C(
+        name="end break",
+        key="E",
+        text=phrase("End the break…"),
+        does=phrase("ends a break early, for a reason"),
+        kind=events.EndBreak,
+    ),
+    _C(
+        name="rearm",
+        key="T",
+        text=phrase("Hold T: test shot"),
+        does=phrase("held for 1 s: a test shot"),
+        kind=events.Rearm,
+    ),
+    _C(name="pause", key="P", text=phrase("Pause"), does=phrase("holds everything; again, goes on"), kind=events.Pause),
+    _C(name="go on", key="P", text=phrase("Go on"), does=phrase("goes on after a pause"), kind=events.GoOn),
+    _C(
+        name="undo",
+        key="U",
+        text=phrase("Undo"),
+        does=phrase("opens the last entry, then the one before"),
+        kind=events.Undo,
+    ),
+    _C(
+        name="leave",
+        key="Esc",
+        text=phrase("Leave"),
+        does=phrase("leaves a field or a correction; never stops"),
+        kind=events.Leave,
+    ),
+    _C(
+        name="repeat",
+        key="R",
+        text=phrase("Repeat…"),
+        does=phrase("presents the trial again, for a reason"),
+        kind=events.Repeat,
+    ),
+    _C(name="flag", key="G", text=phrase("Flag…"), does=phrase("marks the trial with a word"), kind=events.Flag),
+    _C(name="note", key="N", text=phrase("Note…"), does=phrase("writes a note on the trial"), kind=events.Note),
+    _C(
+        name="reason",
+        key="Y",
+        text=phrase("Say why…"),
+        does=phrase("says why there was an emergency stop"),
+        kind=events.Reason,
+    ),
+    _C(
+        name="stop", key="Q", text=phrase("Stop…"), does=phrase("stops the run, which can be resumed"), kind=events.Stop
+    ),
+    _C(name="restart", key="S", text=phrase("Start it again"), does=phrase("starts the participant's screen again")),
+    _C(name="list", key="L", text=phrase("List"), does=phrase("lists flags, notes and corrections of the set")),
+    _C(name="help", key="F1", text=phrase("Keys"), does=phrase("shows this page")),
+    _C(name="theme", key="F2", text=phrase("Dark/light"), does=phrase("changes the colours")),
 )
 BY_NAME: dict[Name, KeyCommand] = {command.name: command for command in KEY_COMMANDS}
 
@@ -209,8 +266,8 @@ def shown_key(name: Name, *, letters: bool, choices: Sequence[Choice] = ()) -> s
         return answers[place] if place < len(answers) else ""
     key = BY_NAME[name].key
     if letters and key == "Space":
-        return f"Esc, then {key}"
-    return f"Ctrl+{key}" if len(key) == 1 and (letters or key in answers) else key
+        return phrase("Esc, then {key}", key=key)
+    return phrase("Ctrl+{key}", key=key) if len(key) == 1 and (letters or key in answers) else key
 
 
 def why_not(name: Name, position: Position) -> str:

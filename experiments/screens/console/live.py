@@ -37,6 +37,7 @@ from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLi
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import NoiseIs
+from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 
@@ -109,12 +110,12 @@ def check_monitor(monitor: int | None) -> None:
 def _band_and_last(study: StudyFolder, choice: RunRequest) -> tuple[str, str]:
     """What the window of a chosen run says of it: its band, and the last sentence."""
     if choice.training:
-        return "TRAINING – nothing of it is kept", "The training is over."
+        return phrase("TRAINING – nothing of it is kept"), phrase("The training is over.")
     if choice.practice:
-        return "PRACTICE – never analysed", "The practice is over: the run itself comes next."
+        return phrase("PRACTICE – never analysed"), phrase("The practice is over: the run itself comes next.")
     names = study.experiments
     later = names[names.index(choice.setup.config.experiment) + 1 :]
-    return "", f"Next: {later[0]}." if later else THANK_PARTICIPANT
+    return "", phrase("Next: {later}.", later=later[0]) if later else THANK_PARTICIPANT
 
 
 def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest, markers: OpenMarkers) -> str:
@@ -126,12 +127,12 @@ def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest, mar
             choice = replace(choice, results=results, sensor="", markers=False)
         if choice.markers:
             beside = markers(choice.results, said.append)
-            while_shown("Starting the markers …", lambda: stack.enter_context(beside))
+            while_shown(phrase("Starting the markers …"), lambda: stack.enter_context(beside))
         went_wrong = WITHOUT_MARKERS if said else _carried_out(replace(choice, seed=request.seed), study)
     return "\n".join(filter(None, (*said, went_wrong)))
 
 
-WITHOUT_MARKERS = f"The run was not begun: mend that, or untick “{SENDS_MARKERS}”."
+WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_markers}”.", sends_markers=SENDS_MARKERS)
 
 
 def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
@@ -147,10 +148,18 @@ def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
 
 def _stopped(choice: RunRequest, reason: str) -> str:
     if choice.training:
-        return f"The training stopped: {reason}."
+        return phrase("The training stopped: {reason}.", reason=reason)
     if choice.practice:
-        return f"The practice of {choice.participant_id} stopped: {reason}. It can be done again."
-    return f"{choice.participant_id} stopped: {reason}. Start asks whether to go on there or to start anew."
+        return phrase(
+            "The practice of {participant_id} stopped: {reason}. It can be done again.",
+            participant_id=choice.participant_id,
+            reason=reason,
+        )
+    return phrase(
+        "{participant_id} stopped: {reason}. Start asks whether to go on there or to start anew.",
+        participant_id=choice.participant_id,
+        reason=reason,
+    )
 
 
 def study_of(request: RunRequest) -> StudyFolder:
@@ -182,7 +191,7 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
         return link
 
     try:
-        link = while_shown("Starting the participant's screen …", open_link)
+        link = while_shown(phrase("Starting the participant's screen …"), open_link)
     except ParticipantError as error:
         raise PlaceError(f"--participant-screen: {error}; look at `recoil doctor`, or run without it") from error
     return ParticipantSide(
@@ -202,7 +211,7 @@ def _noise(link: ParticipantLink) -> NoiseIs:
     try:
         return link.noise(on=True)
     except ParticipantError as error:
-        return NoiseIs(on=False, message=f"Masking noise stays off: {error}")
+        return NoiseIs(on=False, message=phrase("Masking noise stays off: {error}", error=error))
 
 
 class Unfinished(QDialog):
@@ -218,11 +227,11 @@ class Unfinished(QDialog):
         self.setWindowTitle("Recoil – unfinished run")
         self.setStyleSheet(start_sheet())
         answers = (
-            Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._decide("resume", "")),
-            Option(text="Set it aside, start anew", key="Ctrl+N", do=self._fresh),
-            Option(text="Leave it", key="Esc", do=lambda _: self.reject()),
+            Option(text=phrase("Go on with it"), key="Ctrl+G", do=lambda _: self._decide("resume", "")),
+            Option(text=phrase("Set it aside, start anew"), key="Ctrl+N", do=self._fresh),
+            Option(text=phrase("Leave it"), key="Esc", do=lambda _: self.reject()),
         )
-        self.question = QuestionBox(_text(found), answers, reason=f"to start anew: {WHY}")
+        self.question = QuestionBox(_text(found), answers, reason=phrase("to start anew: {why}", why=WHY))
         self.said = TextLines("saved")
         widgets.fill(QVBoxLayout(self), self.question, self.said, margins=None)
         self.setMinimumWidth(720)

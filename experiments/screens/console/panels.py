@@ -13,6 +13,7 @@ from experiments.screens.console import progress, widgets
 from experiments.screens.console.controls import TextField
 from experiments.screens.console.keys import field_at
 from experiments.screens.console.view import About, Instruction, Seen
+from experiments.screens.phrases import phrase
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.states import Position, State
 from experiments.session.steps import Asking, Rate
@@ -107,8 +108,8 @@ class TextFields:
         }
         self._ends, self._question = widgets.text_label("quiet"), widgets.text_label("quiet")
         for field, name, how in (
-            (self.rating, "rating", "type a number, Enter saves"),
-            (self.words, "description", "type the participant's words, Enter saves"),
+            (self.rating, "rating", phrase("type a number, Enter saves")),
+            (self.words, "description", phrase("type the participant's words, Enter saves")),
             (self.line, "line of text", ""),
         ):
             field.setAccessibleName(name)
@@ -181,14 +182,14 @@ class Strip(QtWidgets.QWidget):
         super().__init__()
         self._times_s: list[float] = []
         self.setMinimumHeight(_HIGH_PX)
-        self.setAccessibleName("response times")
+        self.setAccessibleName(phrase("response times"))
 
     def put(self, times_s: list[float]) -> None:
         """Show these times in seconds."""
         if times_s != self._times_s:
             self._times_s = times_s
-            last = f"last {times_s[-1]:.2f} s" if times_s else "none yet"
-            self.setToolTip(f"The participant's own response times: {last}")
+            last = phrase("last {times_s:.2f} s", times_s=times_s[-1]) if times_s else phrase("none yet")
+            self.setToolTip(phrase("The participant's own response times: {last}", last=last))
             self.update()
 
     def paintEvent(self, event: QPaintEvent | None) -> None:  # noqa: N802 - Qt's name
@@ -226,9 +227,9 @@ class SidePanel(QtWidgets.QWidget):
             QtWidgets.QVBoxLayout(self),
             widgets.panel(self._gun, self._focus),
             widgets.panel(self._times),
-            widgets.text_label("quiet", "Coming next"),
+            widgets.text_label("quiet", phrase("Coming next")),
             self._coming,
-            widgets.text_label("quiet", "Answers of this set"),
+            widgets.text_label("quiet", phrase("Answers of this set")),
             self._answers,
             self._strip,
         )
@@ -263,20 +264,20 @@ class Bars(QtWidgets.QWidget):
         """Show what is so now."""
         for bar, one in zip(self._bars, progress.trials_done(seen), strict=True):
             bar.setAccessibleName(one.what)
-            at_most = "at most " if seen.about.plan.may_end_early else ""
-            bar.setFormat(f"{one.what}: %v of {at_most}%m")
+            at_most = phrase("at most ") if seen.about.plan.may_end_early else ""
+            bar.setFormat(phrase("{what}: %v of {at_most}%m", what=one.what, at_most=at_most))
             bar.setMaximum(one.planned)
             bar.setValue(one.count)
 
 
 def _times(seen: Seen, timing: RunTiming) -> str:
-    elapsed = f"Elapsed {clock_text(timing.elapsed_s(seen.now_s))}"
+    elapsed = phrase("Elapsed {clock}", clock=clock_text(timing.elapsed_s(seen.now_s)))
     if seen.ended is not None or seen.position.base is State.HALTED:
         return elapsed
     about = seen.about
     ahead = Ahead(design=about.setup.config, plan=about.plan, told=seen.told, position=seen.position, now_s=seen.now_s)
     ends = end_text(remaining_s(ahead, timing), datetime.now(), at_most=about.plan.may_end_early)
-    return f"{elapsed}\nEnds {ends}"
+    return phrase("{elapsed}\nEnds {ends}", elapsed=elapsed, ends=ends)
 
 
 def _fill(shown: QtWidgets.QListWidget, lines: list[str]) -> None:

@@ -21,6 +21,7 @@ from experiments.screens.console.keys import choices_at, shared_keys
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.phrases import phrase
 from experiments.screens.texts import place_in_set
 from experiments.session import events
 from experiments.session.events import OwnHand
@@ -126,7 +127,7 @@ class ParticipantSide:
         if not self._noise.on:
             tell(Trouble(text=self._noise.message))
             return self._noise.message
-        return "Masking noise plays."
+        return phrase("Masking noise plays.")
 
     @property
     def asking(self) -> bool:
@@ -182,7 +183,7 @@ class ParticipantSide:
                     self._described(step, position, wanted)
         except ParticipantError as error:
             if wanted() and self._link.failure is None:
-                self._tell(Trouble(text=f"Enter the answer here: {error}."))
+                self._tell(Trouble(text=phrase("Enter the answer here: {error}.", error=error)))
 
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
         onset_s = position.since_s if position.onset_s is None else position.onset_s
@@ -209,7 +210,7 @@ class ParticipantSide:
         )
         verdict = self._live.offer(key) if self._live is not None else None
         if verdict is not None and verdict.text:
-            self._tell(Trouble(text=f"The participant’s key was not taken. {verdict.text}"))
+            self._tell(Trouble(text=phrase("The participant’s key was not taken. {text}", text=verdict.text)))
         return bool(verdict)
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
@@ -290,7 +291,7 @@ class ParticipantSide:
         threading.Thread(target=self._restart, daemon=True, name="participant again").start()
 
     def _restart(self) -> None:
-        self._tell(Trouble(text="Starting the participant's screen … it takes some seconds.", mood="wait"))
+        self._tell(Trouble(text=phrase("Starting the participant's screen … it takes some seconds."), mood="wait"))
         try:
             link = self._open_link()
         except ParticipantError as error:
@@ -300,7 +301,7 @@ class ParticipantSide:
             self._link, self._shows, self._starting = link, "", False
         self._tell(ParticipantSeen())
         link.listen(self._heard, self._gone)
-        self._tell(Trouble(text="The participant's screen is there again.", mood="good"))
+        self._tell(Trouble(text=phrase("The participant's screen is there again."), mood="good"))
         self._offer(events.ParticipantBack())
         if self._live is not None:
             self.follow(self._live.position)

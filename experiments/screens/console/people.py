@@ -5,45 +5,65 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from experiments.clock import date_text
+from experiments.screens.phrases import phrase
 from experiments.study.enrolment import left_to_do, passed_over, run_of
 from experiments.study.folders import Overview, is_code
 from experiments.study.study import Participant, RunProgress, taking_part
 
-_CELL = {"done": "done", "not begun": "–", "unreadable": "cannot be read", "synthetic": "synthetic"}
+_CELL = {"done": "done", "not begun": "–", "unreadable": phrase("cannot be read"), "synthetic": "synthetic"}
 
 
 def cell_text(run: RunProgress) -> str:
     """A run in the table of participants."""
-    practice = ["practice done"] if run.practised else []
+    practice = [phrase("practice done")] if run.practised else []
     if run.state in _CELL:
         return "\n".join([_CELL[run.state], *practice])
-    counts = f", {run.answered} of {run.planned}" if run.planned else ""
+    counts = phrase(", {answered} of {planned}", answered=run.answered, planned=run.planned) if run.planned else ""
     return "\n".join([f"{run.state}{counts}", *([date_text(run.last_utc)] if run.last_utc else []), *practice])
 
 
 def note_text(person: Participant) -> str:
     """What the table says of somebody beside their runs."""
-    return "" if person.excluded is None else f"excluded: {person.excluded}"
+    return "" if person.excluded is None else phrase("excluded: {excluded}", excluded=person.excluded)
 
 
 def stopped_text(code: str, run: RunProgress) -> str:
     """When an unfinished run stopped, and how far it had come."""
-    when, counts = date_text(run.last_utc), f"{run.answered} of {run.planned}"
-    spoken = f", in {run.language}" if run.language else ""
-    return f"{code} stopped {run.experiment} on {when} with {counts} trials answered{spoken}."
+    when, counts = (
+        date_text(run.last_utc),
+        phrase("{answered} of {planned}", answered=run.answered, planned=run.planned),
+    )
+    spoken = phrase(", in {language}", language=run.language) if run.language else ""
+    return phrase(
+        "{code} stopped {experiment} on {when} with {counts} trials answered{spoken}.",
+        code=code,
+        experiment=run.experiment,
+        when=when,
+        counts=counts,
+        spoken=spoken,
+    )
 
 
 def coming_text(seen: Overview) -> str:
     """Who comes next."""
     if seen.next is not None:
-        new = " (new)" if seen.next.new else ""
-        return f"Next: {seen.next.participant_id}{new}, {' and '.join(run.experiment for run in seen.next.runs)}"
+        new = phrase(" (new)") if seen.next.new else ""
+        return phrase(
+            "Next: {participant_id}{new}, {experiment}",
+            participant_id=seen.next.participant_id,
+            new=new,
+            experiment=" and ".join(run.experiment for run in seen.next.runs),
+        )
     counted = taking_part(seen.participants)
     elsewhere = [one.participant_id for one in counted if one.is_elsewhere]
     if elsewhere:
-        return f"Nobody waits; at another console now: {', '.join(elsewhere)}."
+        return phrase("Nobody waits; at another console now: {elsewhere}.", elsewhere=", ".join(elsewhere))
     done = all(run.state == "done" for one in counted for run in one.runs)
-    return "Everyone has done everything." if done else "Nobody can be named next: see what cannot be read."
+    return (
+        phrase("Everyone has done everything.")
+        if done
+        else phrase("Nobody can be named next: see what cannot be read.")
+    )
 
 
 def changed_text(seen: Overview) -> str:
@@ -51,8 +71,10 @@ def changed_text(seen: Overview) -> str:
     last, changed = seen.frozen.chain.last, len(seen.frozen.changes)
     if last is None or not changed:
         return ""
-    keys = "1 key has" if changed == 1 else f"{changed} keys have"
-    return f"{keys} changed since {last.title}; `recoil study` names them, and the report will."
+    keys = phrase("1 key has") if changed == 1 else phrase("{changed} keys have", changed=changed)
+    return phrase(
+        "{keys} changed since {title}; `recoil study` names them, and the report will.", keys=keys, title=last.title
+    )
 
 
 def named_text(named: str, code: str, person: Participant | None, experiment: str) -> str:
@@ -60,8 +82,18 @@ def named_text(named: str, code: str, person: Participant | None, experiment: st
     if not code or named in ("", experiment):
         return ""
     if person is not None and run_of(person, named).state == "done":
-        return f"{named} was named, but {code} has done it: {experiment} is chosen."
-    return f"{named} was named, but {code} comes to {experiment} first: {experiment} is chosen."
+        return phrase(
+            "{named} was named, but {code} has done it: {experiment} is chosen.",
+            named=named,
+            code=code,
+            experiment=experiment,
+        )
+    return phrase(
+        "{named} was named, but {code} comes to {experiment} first: {experiment} is chosen.",
+        named=named,
+        code=code,
+        experiment=experiment,
+    )
 
 
 def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:
@@ -74,19 +106,27 @@ def _remarks(
 ) -> Iterator[tuple[str, str]]:
     """What could be said, the most important first."""
     if not code:
-        yield "Who comes? Choose them in the table, or type a code.", "act"
+        yield phrase("Who comes? Choose them in the table, or type a code."), "act"
         return
     if person is not None:
         yield from _hindrances(person, experiment, experiments)
     before = passed_over(person, experiment, experiments)
     if before:
         first = " and ".join(before)
-        yield f"Order broken: {first} comes before {experiment} in this study, and {code} has not done it.", "ask"
+        yield (
+            phrase(
+                ("Order broken: {first} comes before {experiment} in this study, and {code} has not done it."),
+                first=first,
+                experiment=experiment,
+                code=code,
+            ),
+            "ask",
+        )
     if person is None:
         yield (
-            (f"{code} is new.", "good")
+            (phrase("{code} is new.", code=code), "good")
             if is_code(code)
-            else (f"{code} is no code: letters and digits only (A-Z, a-z, 0-9).", "bad")
+            else (phrase("{code} is no code: letters and digits only (A-Z, a-z, 0-9).", code=code), "bad")
         )
     else:
         yield _progress(person, experiment), "good"
@@ -95,21 +135,29 @@ def _remarks(
 def _hindrances(person: Participant, experiment: str, experiments: Sequence[str]) -> Iterator[tuple[str, str]]:
     code, run = person.participant_id, run_of(person, experiment)
     if person.excluded is not None:
-        yield f"{code} is excluded: {person.excluded}.", "bad"
+        yield phrase("{code} is excluded: {excluded}.", code=code, excluded=person.excluded), "bad"
     if person.is_elsewhere:
-        yield f"{code} sits at another console.", "bad"
+        yield phrase("{code} sits at another console.", code=code), "bad"
     if run.state == "unreadable":
-        yield f"The journal of {code}'s {experiment} cannot be read.", "bad"
+        yield phrase("The journal of {code}'s {experiment} cannot be read.", code=code, experiment=experiment), "bad"
     if run.state == "done":
         left = left_to_do(person, experiments)
-        yield f"{code} has done {experiment if left else 'everything'}.", "bad"
+        yield phrase("{code} has done {done}.", code=code, done=experiment if left else phrase("everything")), "bad"
 
 
 def _progress(person: Participant, experiment: str) -> str:
     code, run = person.participant_id, run_of(person, experiment)
     if run.state == "synthetic":
-        return f"A synthetic participant did {experiment} as {code}; that run is set aside when {code} begins."
+        return phrase(
+            ("A synthetic participant did {experiment} as {code}; that run is set aside when {code} begins."),
+            experiment=experiment,
+            code=code,
+        )
     if run.state == "in progress":
         return stopped_text(code, run)
     done = [one.experiment for one in person.runs if one.state == "done"]
-    return f"{code} has done {' and '.join(done)}." if done else f"{code} has not begun."
+    return (
+        phrase("{code} has done {done}.", code=code, done=" and ".join(done))
+        if done
+        else phrase("{code} has not begun.", code=code)
+    )

@@ -11,6 +11,7 @@ from experiments.design.plan import Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
 from experiments.screens.console.view import About, GunSeen, Seen
+from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
 from experiments.session.history import History, answered, done, entries, of_one_set
@@ -57,7 +58,7 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     if isinstance(step, steps.Rate | steps.Describe) and step.later:
         return _still_to_rate(seen, step)[:count]
     if isinstance(step, steps.Close):
-        return ["the end"]
+        return [phrase("the end")]
     trials, here = seen.about.plan.trials, seen.here
     after = [trial for trial in trials[trials.index(here) + 1 :] if trial.track not in seen.over][:count]
     lines: list[str] = []
@@ -66,13 +67,17 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
             lines += _break_between(seen.about, before, trial)
         lines += _to_do(seen.about, before, trial)
     if len(lines) < count and seen.about.rated_last:
-        lines.append("ratings and descriptions")
-    return lines[:count] or ["the end"]
+        lines.append(phrase("ratings and descriptions"))
+    return lines[:count] or [phrase("the end")]
 
 
 def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
     wanted, was = _set_by_hand(about, trial), _set_by_hand(about, before)
-    told = [f"instruction: {trial.instruction}"] if trial.instruction and about.plan.opens_set(trial) else []
+    told = (
+        [phrase("instruction: {instruction}", instruction=trial.instruction)]
+        if trial.instruction and about.plan.opens_set(trial)
+        else []
+    )
     changed = "".join(f", {name.upper()} {value.upper()}" for name, value in wanted.items() if was.get(name) != value)
     return [*told, f"{trial.direction.upper()}{changed}"]
 
@@ -84,14 +89,18 @@ def _set_by_hand(about: About, trial: Trial) -> dict[str, str]:
 
 def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
     plan = seen.about.plan
-    lines = ["its description"] if isinstance(step, steps.Rate) else []
+    lines = [phrase("its description")] if isinstance(step, steps.Rate) else []
     later = plan.trials[plan.trials.index(step.trial) + 1 :]
-    return [*lines, *(f"rating: {texts.ordinal(plan, trial)}" for trial in later), "the end"]
+    return [
+        *lines,
+        *(phrase("rating: {ordinal}", ordinal=texts.ordinal(plan, trial)) for trial in later),
+        phrase("the end"),
+    ]
 
 
 def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
     seconds = break_s(about.setup.config, before, trial)
-    return [f"break of {texts.duration_text(seconds)}"] if seconds else []
+    return [phrase("break of {duration}", duration=texts.duration_text(seconds))] if seconds else []
 
 
 def answer_lines(seen: Seen) -> list[str]:
@@ -105,7 +114,7 @@ def marks(seen: Seen) -> list[str]:
     found = [
         _mark(seen.told, word) for step, word in seen.told if (trial := _about(step, word)) and _same_set(trial, here)
     ]
-    return list(filter(None, found)) or ["Nothing was flagged, noted, corrected or repeated in this set."]
+    return list(filter(None, found)) or [phrase("Nothing was flagged, noted, corrected or repeated in this set.")]
 
 
 def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
@@ -119,13 +128,15 @@ def _same_set(one: Trial, other: Trial) -> bool:
 def _mark(told: History, word: Outcome | Remark) -> str:
     match word:
         case Flagged():
-            return f"Trial {word.trial.trial}: flagged {word.flag}"
+            return phrase("Trial {trial}: flagged {flag}", trial=word.trial.trial, flag=word.flag)
         case Noted(trial=Trial() as trial):
-            return f"Trial {trial.trial}: “{word.text}”"
+            return phrase("Trial {trial}: “{text}”", trial=trial.trial, text=word.text)
         case EntryCorrected():
-            return f"Trial {word.trial.trial}: {texts.corrected_text(told, word)}"
+            return phrase(
+                "Trial {trial}: {corrected}", trial=word.trial.trial, corrected=texts.corrected_text(told, word)
+            )
         case steps.Repeated():
-            return f"Trial {word.trial.trial}: to be presented again ({word.reason})"
+            return phrase("Trial {trial}: to be presented again ({reason})", trial=word.trial.trial, reason=word.reason)
         case _:
             return ""
 
@@ -133,21 +144,26 @@ def _mark(told: History, word: Outcome | Remark) -> str:
 def gun_text(seen: GunSeen | None) -> tuple[str, str]:
     """The gun's state in words, and a word that chooses the colour."""
     if seen is None:
-        return "Gun: not seen yet", "wait"
+        return phrase("Gun: not seen yet"), "wait"
     status: GunStatus | None = seen.status
     if status is None or status.fault:
-        return f"Gun: FAULT – {seen.fault or (status.fault if status else '')}", "bad"
+        return phrase("Gun: FAULT – {fault}", fault=seen.fault or (status.fault if status else "")), "bad"
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
-    return f"Gun: {status.state}\n{texts.shots_text(status.shots)} · coil {status.coil_temperature_C:.0f} °C", mood
+    return phrase(
+        "Gun: {state}\n{shots} · coil {coil_temperature_C:.0f} °C",
+        state=status.state,
+        shots=texts.shots_text(status.shots),
+        coil_temperature_C=status.coil_temperature_C,
+    ), mood
 
 
 def focus_text(seen: Seen, *, here: bool) -> tuple[str, str]:
     """Whose the keys are, and a word that chooses the colour; empty where nothing else could have them."""
     if here:
-        return ("Keys: this window", "good") if seen.participant is not None else ("", "good")
+        return (phrase("Keys: this window"), "good") if seen.participant is not None else ("", "good")
     if seen.participant is not None and seen.participant.focused:
-        return "Keys: the participant's screen (F12 works there)", "wait"
-    return "Keys: ANOTHER WINDOW – click here", "bad"
+        return phrase("Keys: the participant's screen (F12 works there)"), "wait"
+    return phrase("Keys: ANOTHER WINDOW – click here"), "bad"
 
 
 def own_times_s(seen: Seen) -> list[float]:

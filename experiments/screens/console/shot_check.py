@@ -23,9 +23,10 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.screens.console import widgets
 from experiments.screens.console.widgets import TextLines
+from experiments.screens.phrases import phrase
 
 COUNTDOWN_S = 3
-SWITCH_OFF = "SWITCH OFF ITS POWER."
+SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,11 +82,11 @@ class ShotCheck:
 
     def carry_out(self) -> None:
         """All of it, in this thread."""
-        text, mood = "The test shot ended without a word; start Recoil from a terminal to see why.", "bad"
+        text, mood = phrase("The test shot ended without a word; start Recoil from a terminal to see why."), "bad"
         try:
             text, mood = self._with_gun()
         except (DeviceError, ValueError) as error:
-            text = f"Test shot of {self._label}: {error}"
+            text = phrase("Test shot of {label}: {error}", label=self._label, error=error)
         finally:
             self._tell(ShotProgress(phase="over", fired=self._report is not None, text=text, mood=mood))
 
@@ -103,7 +104,7 @@ class ShotCheck:
             try:
                 outcome, mood = self._fire(gun, drive), "good"
             except (DeviceError, ValueError) as error:
-                outcome, mood = f"Test shot of {self._label}: {error}.", "bad"
+                outcome, mood = phrase("Test shot of {label}: {error}.", label=self._label, error=error), "bad"
             state, is_safe = state_text(self._disarmed(gun))
         return f"{outcome} {state}", "bad" if self._latched.is_set() or not is_safe else mood
 
@@ -114,7 +115,7 @@ class ShotCheck:
                 break
         if not self._off.is_set():
             self._report = self._armed_shot(gun, drive)
-        return "Nothing was fired." if self._report is None else report_text(self._label, self._report, drive)
+        return phrase("Nothing was fired.") if self._report is None else report_text(self._label, self._report, drive)
 
     def _armed_shot(self, gun: Gun, drive: Drive) -> ShotReport | None:
         """As the runner fires the first shot of a stimulus: armed for it alone, as soon as the magnet is home."""
@@ -143,37 +144,49 @@ def report_text(label: str, report: ShotReport, drive: Drive) -> str:
 def _report_sentences(report: ShotReport, drive: Drive) -> Iterator[str]:
     duration_ms = 1000 * (report.pulse_end_s - report.pulse_start_s)
     if isinstance(drive, Effect):
-        yield f"the gun vibrated for {duration_ms:.0f} ms."
+        yield phrase("the gun vibrated for {duration_ms:.0f} ms.", duration_ms=duration_ms)
     else:
-        yield f"the coil was driven at {drive.voltage_V:g} V for {duration_ms:.1f} ms."
+        yield phrase(
+            "the coil was driven at {voltage_V:g} V for {duration_ms:.1f} ms.",
+            voltage_V=drive.voltage_V,
+            duration_ms=duration_ms,
+        )
         yield _motion(report)
     if report.timing is not None:
         began_ms = 1000 * (report.pulse_start_s - report.timing.requested_s)
         yield (
-            f"The pulse began {began_ms:.1f} ms after the request, by the gun's clock (to within "
-            f"{1000 * report.timing.uncertainty_s:.1f} ms)."
+            phrase(
+                (
+                    "The pulse began {began_ms:.1f} ms after the request, by the gun's clock (to within "
+                    "{uncertainty_s:.1f} ms)."
+                ),
+                began_ms=began_ms,
+                uncertainty_s=1000 * report.timing.uncertainty_s,
+            )
         )
 
 
 def _motion(report: ShotReport) -> str:
     """What the magnet did by the model: there is no sensor that sees it."""
     if report.motion == "no-break-away":
-        return "By the model the magnet did not move."
+        return phrase("By the model the magnet did not move.")
     if report.motion == "home":
         home_ms = 1000 * (report.home_predicted_s - report.pulse_start_s)
-        return f"By the model the magnet moved, and was home after {home_ms:.0f} ms."
-    return f"By the model the magnet is not home ({report.motion})."
+        return phrase("By the model the magnet moved, and was home after {home_ms:.0f} ms.", home_ms=home_ms)
+    return phrase("By the model the magnet is not home ({motion}).", motion=report.motion)
 
 
 def state_text(status: GunStatus | None) -> tuple[str, bool]:
     """What the gun reports of itself, and whether it is safe to take."""
     if status is None:
-        return f"The gun's state cannot be read: {SWITCH_OFF}", False
+        return phrase("The gun's state cannot be read: {switch_off}", switch_off=SWITCH_OFF), False
     if status.fault is not None:
-        return f"The gun reports a fault ({status.fault}): {SWITCH_OFF}", False
+        return phrase(
+            "The gun reports a fault ({fault}): {switch_off}", fault=status.fault, switch_off=SWITCH_OFF
+        ), False
     if status.state != "disarmed":
-        return f"The gun reports: {status.state}. {SWITCH_OFF}", False
-    return "The gun reports: disarmed.", True
+        return phrase("The gun reports: {state}. {switch_off}", state=status.state, switch_off=SWITCH_OFF), False
+    return phrase("The gun reports: disarmed."), True
 
 
 class ShotPage(QWidget):
@@ -201,9 +214,9 @@ class ShotPage(QWidget):
             TextLines("detail", most_lines=9),
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        self.call_off_button = widgets.button(self, "Call it off", "Esc", self._escape)
-        self.next_button = widgets.button(self, "Next test shot", "Ctrl+T", self.begin)
-        self.stop_button = widgets.button(self, "EMERGENCY STOP", "F12", self.emergency_stop, name="stop")
+        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
+        self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
+        self.stop_button = widgets.button(self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop")
         down = widgets.fill(QVBoxLayout(self), self.title, self.detail, self.count)
         down.addStretch(1)
         widgets.fill(down, self.stop_button, self.call_off_button, self.next_button)
@@ -229,10 +242,10 @@ class ShotPage(QWidget):
     def next_text(self) -> str:
         """What the button of the next test shot says: the method, and the damper that is to be set by hand before."""
         if self._setup is None:
-            return "Test shot"
+            return phrase("Test shot")
         method = self._setup.gun.methods[self._next_method(self._setup)]
-        damper = f", damper {method.damper.upper()}" if method.damper else ""
-        return f"Test shot: {method.label}{damper}"
+        damper = phrase(", damper {damper}", damper=method.damper.upper()) if method.damper else ""
+        return phrase("Test shot: {label}{damper}", label=method.label, damper=damper)
 
     def _next_method(self, setup: Setup[DesignConfig]) -> str:
         methods: tuple[str, ...] = setup.config.methods
@@ -243,8 +256,10 @@ class ShotPage(QWidget):
         if self._check is not None or self._setup is None or self.stopped:
             return
         method = self._next_method(self._setup)
-        self._shown = self.next_text().removeprefix("Test shot: ")
-        self._show("One moment", f"Looking for the gun. Test shot of {self._shown}.", "wait")
+        self._shown = self.next_text().removeprefix(phrase("Test shot: "))
+        self._show(
+            phrase("One moment"), phrase("Looking for the gun. Test shot of {shown}.", shown=self._shown), "wait"
+        )
         self._running(True)
         self._check = ShotCheck(self._setup, method, self._gun, self._clock, self.told.emit)
         self._check.start()
@@ -255,7 +270,11 @@ class ShotPage(QWidget):
             return
         self._check.emergency_stop()
         self.stopped = True
-        self._show("EMERGENCY STOP", f"Disarming. If the gun does not fall silent: {SWITCH_OFF}", "bad")
+        self._show(
+            phrase("EMERGENCY STOP"),
+            phrase("Disarming. If the gun does not fall silent: {switch_off}", switch_off=SWITCH_OFF),
+            "bad",
+        )
 
     def call_off(self) -> None:
         """Fire no more, if it has not fired."""
@@ -275,16 +294,20 @@ class ShotPage(QWidget):
         elif self.stopped:
             return
         elif told.phase == "counting":
-            self._show("STAND CLEAR", f"{self._shown} will be fired. Nobody may hold the gun. Esc calls it off.", "ask")
+            self._show(
+                phrase("STAND CLEAR"),
+                phrase("{shown} will be fired. Nobody may hold the gun. Esc calls it off.", shown=self._shown),
+                "ask",
+            )
             self.count.setText(str(told.seconds))
         elif told.phase == "firing":
-            self._show("Firing", self._shown, "wait")
+            self._show(phrase("Firing"), self._shown, "wait")
 
     def _end(self, told: ShotProgress) -> None:
         self._check = None
         if told.fired:
             self._method_at += 1
-        title = "EMERGENCY STOP" if self.stopped else "Fired" if told.fired else "Not fired"
+        title = phrase("EMERGENCY STOP") if self.stopped else phrase("Fired") if told.fired else phrase("Not fired")
         self._show(title, told.text, told.mood)
         self._running(False)
         self.over()
@@ -298,5 +321,5 @@ class ShotPage(QWidget):
     def _running(self, running: bool) -> None:
         self.stop_button.setVisible(running)
         self.next_button.setVisible(not (running or self.stopped))
-        self.next_button.setText(f"{self.next_text()}  [Ctrl+T]")
-        self.call_off_button.setText("Call it off  [Esc]" if running else "Back  [Esc]")
+        self.next_button.setText(phrase("{next}  [Ctrl+T]", next=self.next_text()))
+        self.call_off_button.setText(phrase("Call it off  [Esc]") if running else phrase("Back  [Esc]"))

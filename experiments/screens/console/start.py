@@ -17,13 +17,14 @@ from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
+from experiments.screens.phrases import phrase
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, overview
 from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
 SIMULATED = "simulated"
-STOPPED = "The last test shot ended by an emergency stop."
+STOPPED = phrase("The last test shot ended by an emergency stop.")
 
 
 class StartWindow(QtWidgets.QWidget):
@@ -69,7 +70,9 @@ class StartWindow(QtWidgets.QWidget):
 
     def _gun(self) -> QtWidgets.QWidget:
         simulated = self._opening.gun == SIMULATED
-        made = widgets.text_label("gun", "SIMULATED GUN" if simulated else f"Gun: {self._opening.gun}", wrap=False)
+        made = widgets.text_label(
+            "gun", phrase("SIMULATED GUN") if simulated else phrase("Gun: {gun}", gun=self._opening.gun), wrap=False
+        )
         widgets.set_mood(made, "ask" if simulated else "wait")
         return made
 
@@ -77,15 +80,15 @@ class StartWindow(QtWidgets.QWidget):
         def button(text: str, key: str, slot: Callable[[], object], name: str = "") -> QtWidgets.QPushButton:
             return widgets.button(page, text, key, slot, name=name)
 
-        self.test_button = button("Test shot", "Ctrl+T", self._test_shot)
-        self.exclude_button = button("Exclude…", "Alt+E", self._ask_exclusion)
+        self.test_button = button(phrase("Test shot"), "Ctrl+T", self._test_shot)
+        self.exclude_button = button(phrase("Exclude…"), "Alt+E", self._ask_exclusion)
         grid = QtWidgets.QGridLayout()
-        grid.addWidget(button("Start", "Ctrl+Return", self._start, "large"), 0, 0, 2, 1)
-        grid.addWidget(button("Practice", "Ctrl+P", self._practice), 0, 1)
-        grid.addWidget(button("Training (simulated gun)", "Ctrl+R", self._training), 0, 2, 1, 2)
+        grid.addWidget(button(phrase("Start"), "Ctrl+Return", self._start, "large"), 0, 0, 2, 1)
+        grid.addWidget(button(phrase("Practice"), "Ctrl+P", self._practice), 0, 1)
+        grid.addWidget(button(phrase("Training (simulated gun)"), "Ctrl+R", self._training), 0, 2, 1, 2)
         grid.addWidget(self.test_button, 1, 1, 1, 2)
         grid.addWidget(self.exclude_button, 1, 3)
-        grid.addWidget(button("Quit", "Ctrl+Q", self.close), 0, 4, 2, 1)
+        grid.addWidget(button(phrase("Quit"), "Ctrl+Q", self.close), 0, 4, 2, 1)
         for column, stretch in enumerate((3, 2, 2, 2, 1)):
             grid.setColumnStretch(column, stretch)
         return grid
@@ -137,9 +140,9 @@ class StartWindow(QtWidgets.QWidget):
         person = self._person(code)
         self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments))
         out = person is not None and person.excluded is not None
-        self.exclude_button.setText(f"{'Readmit…' if out else 'Exclude…'}  [Alt+E]")
+        self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
         self.shots.choose(self._setup())
-        self.test_button.setText(f"{self.shots.next_text()}  [Ctrl+T]")
+        self.test_button.setText(phrase("{next}  [Ctrl+T]", next=self.shots.next_text()))
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
         """Have the type grow with the window."""
@@ -185,7 +188,7 @@ class StartWindow(QtWidgets.QWidget):
             self.question = None
 
     def _leave_it(self) -> Option:
-        return Option(text="Leave it", key="Esc", do=lambda _: self._take_back())
+        return Option(text=phrase("Leave it"), key="Esc", do=lambda _: self._take_back())
 
     # choosing
 
@@ -233,17 +236,27 @@ class StartWindow(QtWidgets.QWidget):
             self._simulation_is_known = True
             self._start()
 
-        text = f"The gun is SIMULATED: {self.form.participant_id} will feel nothing. Start all the same?"
-        self._ask(QuestionBox(text, (Option(text="Start, simulated", key="Ctrl+S", do=known), self._leave_it())))
+        text = phrase(
+            "The gun is SIMULATED: {participant_id} will feel nothing. Start all the same?",
+            participant_id=self.form.participant_id,
+        )
+        self._ask(
+            QuestionBox(text, (Option(text=phrase("Start, simulated"), key="Ctrl+S", do=known), self._leave_it()))
+        )
 
     def _ask_resume(self, run: RunProgress) -> None:
         answers = (
-            Option(text="Go on with it", key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
-            Option(text="Set it aside, start anew", key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
+            Option(text=phrase("Go on with it"), key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
+            Option(
+                text=phrase("Set it aside, start anew"), key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)
+            ),
             self._leave_it(),
         )
-        text = f"{people.stopped_text(self.form.participant_id, run)} Go on there, or set it aside and start anew?"
-        self._ask(QuestionBox(text, answers, reason=f"to start anew: {WHY}"))
+        text = phrase(
+            "{stopped} Go on there, or set it aside and start anew?",
+            stopped=people.stopped_text(self.form.participant_id, run),
+        )
+        self._ask(QuestionBox(text, answers, reason=phrase("to start anew: {why}", why=WHY)))
 
     def _begin_again(self, again: Again, reason: str) -> None:
         """Check everything once more, as Start does: the study may have gone on at another console meanwhile."""
@@ -289,13 +302,15 @@ class StartWindow(QtWidgets.QWidget):
         person = self._person(self.form.participant_id)
         if person is None:
             self._take_back()
-            self.say("Choose in the table who is to be excluded; a code that is not there needs none.", "bad")
+            self.say(phrase("Choose in the table who is to be excluded; a code that is not there needs none."), "bad")
             return
         out = person.excluded is not None
-        verb, act = ("Readmit", enrolment.readmit) if out else ("Exclude", enrolment.exclude)
+        verb, act = (phrase("Readmit"), enrolment.readmit) if out else (phrase("Exclude"), enrolment.exclude)
         text = f"{verb} {person.participant_id}? "
         text += (
-            f"They are excluded: {person.excluded}." if out else "Their logs stay, but are left out of the analysis."
+            phrase("They are excluded: {excluded}.", excluded=person.excluded)
+            if out
+            else phrase("Their logs stay, but are left out of the analysis.")
         )
 
         def carry_out(reason: str) -> None:
@@ -324,8 +339,12 @@ class StartWindow(QtWidgets.QWidget):
     def _test_shot(self) -> None:
         self._take_back()
         if self.shots.stopped:
-            sure = Option(text="It is: test shot", key="Ctrl+S", do=lambda _: self._enter_shots())
-            self._ask(QuestionBox(f"{STOPPED} Is the gun where it hurts nobody?", (sure, self._leave_it())))
+            sure = Option(text=phrase("It is: test shot"), key="Ctrl+S", do=lambda _: self._enter_shots())
+            self._ask(
+                QuestionBox(
+                    phrase("{stopped} Is the gun where it hurts nobody?", stopped=STOPPED), (sure, self._leave_it())
+                )
+            )
         else:
             self._enter_shots()
 

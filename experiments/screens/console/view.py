@@ -16,12 +16,13 @@ from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, choices_at, shown_key
+from experiments.screens.phrases import phrase
 from experiments.session.history import History, entered_value, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Present, Rate, Rest, Step, what
 
-THANK_PARTICIPANT = "Thank the participant."
+THANK_PARTICIPANT = phrase("Thank the participant.")
 """The last sentence, where nothing else comes next."""
 
 
@@ -162,7 +163,7 @@ def typed_there(about: About, position: Position) -> bool:
 
 def method_code(plan: Plan, trial: Trial) -> str:
     """The name under which the experimenter meets a method: A, B, C in the order of the run."""
-    return f"Method {chr(ord('A') + plan.methods.index(trial.method))}"
+    return phrase("Method {letter}", letter=chr(ord("A") + plan.methods.index(trial.method)))
 
 
 def method_text(about: About, trial: Trial) -> str:
@@ -187,7 +188,7 @@ def bands(seen: Seen) -> list[tuple[str, str]]:
     """What must not be overlooked, each with its colour's name."""
     found = [(seen.about.band, "practice")] if seen.about.band else []
     if seen.about.simulated:
-        found.append(("SIMULATED GUN – nothing is felt", "simulated"))
+        found.append((phrase("SIMULATED GUN – nothing is felt"), "simulated"))
     return found
 
 
@@ -200,13 +201,17 @@ def instruction(seen: Seen) -> Instruction:
 
 
 def _end(about: About, ended: Ended) -> Instruction:
-    safe = "" if ended.saved is None else f"Read back from the disk: {_answers(ended.saved)}, all that were given. "
-    close = "Q closes this window."
+    safe = (
+        ""
+        if ended.saved is None
+        else phrase("Read back from the disk: {answers}, all that were given. ", answers=_answers(ended.saved))
+    )
+    close = phrase("Q closes this window.")
     if ended.reason is None:
-        return Instruction(title="Finished", detail=f"{safe}{about.last}\n{close}", mood="good")
-    resumed = "" if ended.saved is None else f"{safe}The run can be resumed."
+        return Instruction(title=phrase("Finished"), detail=f"{safe}{about.last}\n{close}", mood="good")
+    resumed = "" if ended.saved is None else phrase("{safe}The run can be resumed.", safe=safe)
     detail = "\n".join(filter(None, (_sentence(ended.reason), resumed, close)))
-    return Instruction(title="Stopped", detail=detail, mood="bad")
+    return Instruction(title=phrase("Stopped"), detail=detail, mood="bad")
 
 
 def _sentence(why: str) -> str:
@@ -220,10 +225,10 @@ def _sentence(why: str) -> str:
 
 
 def _answers(count: int) -> str:
-    return f"{count} answer{'' if count == 1 else 's'}"
+    return phrase("1 answer") if count == 1 else phrase("{count} answers", count=count)
 
 
-_MOMENT = Instruction(title="One moment", mood="wait")
+_MOMENT = Instruction(title=phrase("One moment"), mood="wait")
 
 
 def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
@@ -233,7 +238,7 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
     again = texts.again_text(seen.told, step)
     told = texts.read_out_text(seen.about.plan, step).strip()
     return Instruction(
-        title=f"{texts.turn_text(step)}\nand hand it over",
+        title=phrase("{turn}\nand hand it over", turn=texts.turn_text(step)),
         damper=damper.format(settings=texts.settings_text(step), method=method_text(seen.about, step.trial)),
         detail="\n".join(filter(None, (told, again, then))),
     )
@@ -242,22 +247,24 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
 def _setting(seen: Seen) -> Instruction:
     step = seen.position.step
     names = " and ".join(name for name, _ in step.settings) if isinstance(step, Prepare) else ""
-    then = f"Confirm the {names} with {seen.key('damper')}."
-    return _turned(seen, damper="Set the {settings}{method}", then=then)
+    then = phrase("Confirm the {names} with {damper_key}.", names=names, damper_key=seen.key("damper"))
+    return _turned(seen, damper=phrase("Set the {settings}{method}"), then=then)
 
 
 def _preparing(seen: Seen) -> Instruction:
     step = seen.position.step
-    damper = "The {settings}{method}" if isinstance(step, Prepare) and step.settings else ""
-    return _turned(seen, damper=damper, then=f"Then fire with {seen.key('fire')}.")
+    damper = phrase("The {settings}{method}") if isinstance(step, Prepare) and step.settings else ""
+    return _turned(seen, damper=damper, then=phrase("Then fire with {fire_key}.", fire_key=seen.key("fire")))
 
 
 def _train(seen: Seen) -> Instruction:
     least_s = seen.position.step.least_exposure_s if isinstance(seen.position.step, Present) else 0.0
-    after = f", not before {least_s:g}\N{NO-BREAK SPACE}s" if least_s else ""
+    after = phrase(", not before {least_s:g}\N{NO-BREAK SPACE}s", least_s=least_s) if least_s else ""
     return Instruction(
-        title="Wait for “next”",
-        detail=f"The gun goes on firing until then. Press Space when the participant says it{after}.",
+        title=phrase("Wait for “next”"),
+        detail=phrase(
+            "The gun goes on firing until then. Press Space when the participant says it{after}.", after=after
+        ),
         mood="ask",
     )
 
@@ -266,9 +273,15 @@ def _asking(seen: Seen) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Ask):
         return _MOMENT
-    own_keys = either(f"{one.own_key.upper()} for {one.label}" for one in step.choices)
-    own = f"Awaited: the participant's own key, {own_keys}.\n{_keys(step)} enters it for them."
-    told = f"Enter what the participant says: {_keys(step)}."
+    own_keys = either(
+        phrase("{own_key} for {label}", own_key=one.own_key.upper(), label=one.label) for one in step.choices
+    )
+    own = phrase(
+        "Awaited: the participant's own key, {own_keys}.\n{keys} enters it for them.",
+        own_keys=own_keys,
+        keys=_keys(step),
+    )
+    told = phrase("Enter what the participant says: {keys}.", keys=_keys(step))
     there = _asked_there(seen, own, told) if seen.about.participant_keys else told
     about = texts.ordinal(seen.about.plan, step.trial, seen.about.messages) if step.later else ""
     return Instruction(title=step.text, detail="\n".join(filter(None, (about, there))), mood="ask")
@@ -285,12 +298,16 @@ def either(words: Iterable[str]) -> str:
     ('F or B', '1, 2 or 3')
     """
     *before, last = words
-    return f"{', '.join(before)} or {last}" if before else last
+    return phrase("{before} or {last}", before=", ".join(before), last=last) if before else last
 
 
 def _asked_there(seen: Seen, awaited: str, here: str) -> str:
     """What is awaited from the participant's screen, or that there is none any more."""
-    return f"Their screen is gone. {here} To start it again, pause first." if seen.participant_gone else awaited
+    return (
+        phrase("Their screen is gone. {here} To start it again, pause first.", here=here)
+        if seen.participant_gone
+        else awaited
+    )
 
 
 def _rating(seen: Seen) -> Instruction:
@@ -298,8 +315,8 @@ def _rating(seen: Seen) -> Instruction:
     if not isinstance(step, Rate | Describe):
         return _MOMENT
     kind = what(step)
-    own = f"Awaited: the participant's {kind} on their own screen, or type it here."
-    there = _asked_there(seen, own, "Type here what they say.") if seen.about.participant_rates else ""
+    own = phrase("Awaited: the participant's {kind} on their own screen, or type it here.", kind=kind)
+    there = _asked_there(seen, own, phrase("Type here what they say.")) if seen.about.participant_rates else ""
     about = texts.ordinal(seen.about.plan, step.trial, seen.about.messages)
     title, *more = (about, step.text) if step.later else (step.text,)
     return Instruction(title=title, detail="\n".join(filter(None, (*more, there))), mood="ask")
@@ -310,11 +327,15 @@ def _telling(seen: Seen) -> Instruction:
     if not isinstance(step, Inform):
         return _MOMENT
     title = {
-        "instruction": "Tell the participant",
-        "consent": "Ask the participant for their consent",
-        "feedback": "Tell the participant",
+        "instruction": phrase("Tell the participant"),
+        "consent": phrase("Ask the participant for their consent"),
+        "feedback": phrase("Tell the participant"),
     }[step.what]
-    return Instruction(title=title, detail=f"“{step.text}”\n{seen.key('enter')} when that is done.", mood="act")
+    return Instruction(
+        title=title,
+        detail=phrase("“{text}”\n{enter_key} when that is done.", text=step.text, enter_key=seen.key("enter")),
+        mood="act",
+    )
 
 
 def _resting(seen: Seen) -> Instruction:
@@ -322,19 +343,23 @@ def _resting(seen: Seen) -> Instruction:
     left_s = 0 if until_s is None else max(0, round(until_s - seen.now_s))
     between = step.between if isinstance(step, Rest) else ""
     return Instruction(
-        title=f"Break: {texts.duration_text(left_s)}",
-        detail=f"Between {between}. It ends by itself with a tone.",
+        title=phrase("Break: {duration}", duration=texts.duration_text(left_s)),
+        detail=phrase("Between {between}. It ends by itself with a tone.", between=between),
         mood="rest",
     )
 
 
 def _paused(seen: Seen) -> Instruction:
     if seen.position.why:
-        again = f"{seen.key('restart')} starts it again. {seen.key('go on')} goes on without it: you enter the answers."
+        again = phrase(
+            "{restart_key} starts it again. {go_on_key} goes on without it: you enter the answers.",
+            restart_key=seen.key("restart"),
+            go_on_key=seen.key("go on"),
+        )
         detail = f"{_sentence(seen.position.why)}\n{again}"
     else:
-        detail = f"The gun is disarmed, and nothing goes on. {seen.key('go on')} goes on."
-    return Instruction(title="Paused", detail=detail, mood="wait")
+        detail = phrase("The gun is disarmed, and nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
+    return Instruction(title=phrase("Paused"), detail=detail, mood="wait")
 
 
 def _correcting(seen: Seen) -> Instruction:
@@ -342,10 +367,14 @@ def _correcting(seen: Seen) -> Instruction:
     if entry is None:
         return _MOMENT
     return Instruction(
-        title=f"Correct the {what(entry)}",
+        title=phrase("Correct the {what}", what=what(entry)),
         damper=texts.place_text(seen.about.plan, entry.trial),
-        detail=f"It was entered as {texts.value_text(entry, entered_value(seen.told, entry))}. {_entered_how(entry)}\n"
-        f"{seen.key('undo')} goes further back, Esc leaves it.",
+        detail=phrase(
+            "It was entered as {value}. {entered_how}\n{undo_key} goes further back, Esc leaves it.",
+            value=texts.value_text(entry, entered_value(seen.told, entry)),
+            entered_how=_entered_how(entry),
+            undo_key=seen.key("undo"),
+        ),
         mood="ask",
     )
 
@@ -353,35 +382,43 @@ def _correcting(seen: Seen) -> Instruction:
 def _entered_how(entry: Asking) -> str:
     match entry:
         case Ask():
-            return f"Enter what the participant said: {_keys(entry)}."
+            return phrase("Enter what the participant said: {keys}.", keys=_keys(entry))
         case Rate():
-            return "Type what the participant said, Enter saves; Ctrl+X for no answer."
+            return phrase("Type what the participant said, Enter saves; Ctrl+X for no answer.")
         case Describe():
-            return "Type the participant's words; Enter saves."
+            return phrase("Type the participant's words; Enter saves.")
 
 
 def _halted(seen: Seen) -> Instruction:
     status = None if seen.gun is None else seen.gun.status
     disarmed = status is not None and status.state == "disarmed"
-    does_not = "The gun does not say that it is disarmed: SWITCH OFF ITS POWER."
+    does_not = phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
     return Instruction(
-        title="EMERGENCY STOP",
-        damper="The gun itself says that it is disarmed." if disarmed else does_not,
-        detail=f"Nothing fires in this run any more. {seen.key('reason')} says why, {seen.key('stop')} closes it. "
-        "Resumed, it begins with a test shot.",
+        title=phrase("EMERGENCY STOP"),
+        damper=phrase("The gun itself says that it is disarmed.") if disarmed else does_not,
+        detail=phrase(
+            (
+                "Nothing fires in this run any more. {reason_key} says why, {stop_key} closes it. "
+                "Resumed, it begins with a test shot."
+            ),
+            reason_key=seen.key("reason"),
+            stop_key=seen.key("stop"),
+        ),
         mood="bad",
     )
 
 
 _OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
     State.REARMING: Instruction(
-        title="There was an emergency stop.\nStand clear.",
-        detail="Put the gun where it hurts nobody, then hold T for a second: a test shot, then the run goes on.",
+        title=phrase("There was an emergency stop.\nStand clear."),
+        detail=phrase(
+            "Put the gun where it hurts nobody, then hold T for a second: a test shot, then the run goes on."
+        ),
         mood="bad",
     ),
     State.SETTING: _setting,
     State.PREPARING: _preparing,
-    State.FIRING: Instruction(title="Firing", detail="F12 stops it at once.", mood="wait"),
+    State.FIRING: Instruction(title=phrase("Firing"), detail=phrase("F12 stops it at once."), mood="wait"),
     State.TRAIN: _train,
     State.ASKING: _asking,
     State.RATING: _rating,
@@ -389,8 +426,8 @@ _OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
     State.INFORMING: _telling,
     State.RESTING: _resting,
     State.CLOSING: Instruction(
-        title="Everything is answered",
-        detail="Is there anything to correct, to note or to flag? Enter ends the run.",
+        title=phrase("Everything is answered"),
+        detail=phrase("Is there anything to correct, to note or to flag? Enter ends the run."),
         mood="good",
     ),
     State.PAUSED: _paused,

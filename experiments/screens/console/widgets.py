@@ -16,6 +16,7 @@ from PyQt6 import QtGui, QtWidgets
 from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 
 from experiments.screens.participant.messages import Theme
+from experiments.screens.phrases import phrase
 from experiments.study.register import MAX_REASON, RegisterError, check_reason
 
 MOODS = ("act", "ask", "rest", "wait", "good", "bad")
@@ -259,7 +260,7 @@ class LineEdit(QtWidgets.QLineEdit):
         return QSize(40, super().minimumSizeHint().height())
 
 
-WHY = "why? (never a name)"
+WHY = phrase("why? (never a name)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -295,7 +296,7 @@ class QuestionBox(QtWidgets.QFrame):
         try:
             check_reason(reason)
         except RegisterError as error:
-            say(f"{error}." if reason else "Type why, first.", "bad")
+            say(f"{error}." if reason else phrase("Type why, first."), "bad")
             self.reason.setFocus()
             return False
         return True

@@ -19,6 +19,7 @@ from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, Te
 from experiments.screens.console.progress import marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
+from experiments.screens.phrases import phrase
 from experiments.screens.texts import saved_text
 from experiments.session.duration import RunTiming
 from experiments.session.events import Press
@@ -87,7 +88,9 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _build(self) -> None:
         what = self.about.band or self.about.plan.experiment
-        self.setWindowTitle(f"Recoil – {self.about.plan.participant_id}, {what}")
+        self.setWindowTitle(
+            phrase("Recoil – {participant_id}, {what}", participant_id=self.about.plan.participant_id, what=what)
+        )
         self.bands = [widgets.text_label("band", wrap=False) for _ in range(2)]
         self.place, self.saved = widgets.text_label("place"), widgets.text_label("saved")
         self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), SidePanel(self.about), Buttons(self)
@@ -355,7 +358,9 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def show_list(self) -> None:
         """Cover the run with the marks of the set."""
-        self.show_page("Flags, notes, corrections and repeats of this set. Esc leaves this page.", marks(self.seen))
+        self.show_page(
+            phrase("Flags, notes, corrections and repeats of this set. Esc leaves this page."), marks(self.seen)
+        )
 
     def other_theme(self) -> None:
         """Change the colours."""
