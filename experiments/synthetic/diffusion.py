@@ -20,7 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from experiments.design.streams import Stream
@@ -214,11 +213,13 @@ def exit_times(drift: Floats, half_width: Floats, draw: Draw) -> Floats:
 
 def late_shares(c: Floats) -> Floats:
     """The share of proposals that lie beyond `_CUT`: p / (p + q) of Polson, Scott & Windle, both times exp(c)."""
+    from scipy.special import erfc  # noqa: PLC0415 - slow, and whoever only reads a design needs none of it
+
     near = np.minimum(c, SURE)
     rate, root = math.pi**2 / 8.0 + near * near / 2.0, math.sqrt(2.0 * _CUT)
     p = math.pi / (2.0 * rate) * np.exp(near - rate * _CUT)
-    above = np.exp(2.0 * near) * scipy.special.erfc((1.0 + _CUT * near) / root)
-    share = p / (p + scipy.special.erfc((1.0 - _CUT * near) / root) + above)
+    above = np.exp(2.0 * near) * erfc((1.0 + _CUT * near) / root)
+    share = p / (p + erfc((1.0 - _CUT * near) / root) + above)
     return np.where(c > SURE, 0.0, share)
 
 
@@ -238,9 +239,11 @@ def _early_slow(c: Floats, draw: Draw) -> Floats:
 
     1/N^2 below `_CUT`, tilted by exp(-c^2 x / 2): at least 0.45 of the proposals are taken.
     """
+    from scipy.special import ndtri  # noqa: PLC0415 - as above
+
     x, wanting = np.empty_like(c), np.arange(c.size)
     while wanting.size:
-        proposed = scipy.special.ndtri(LEVY_TAIL * draw(wanting.size)) ** -2.0
+        proposed = ndtri(LEVY_TAIL * draw(wanting.size)) ** -2.0
         taken = draw(wanting.size) < np.exp(-(c[wanting] ** 2) * proposed / 2.0)
         x[wanting[taken]] = proposed[taken]
         wanting = wanting[~taken]
@@ -252,10 +255,12 @@ def _early_fast(c: Floats, draw: Draw) -> Floats:
 
     Michael, Schucany & Haas 1976, Am. Stat. 30, 88; the smaller root without cancellation.
     """
+    from scipy.special import ndtri  # noqa: PLC0415 - as above
+
     x, wanting = np.empty_like(c), np.arange(c.size)
     while wanting.size:
         mean = 1.0 / c[wanting]
-        h = mean * scipy.special.ndtri(draw(wanting.size)) ** 2 / 2.0
+        h = mean * ndtri(draw(wanting.size)) ** 2 / 2.0
         root = mean / (1.0 + h + np.sqrt(h * (2.0 + h)))
         smaller = draw(wanting.size) * (mean + root) <= mean
         proposed = np.where(smaller, root, mean * mean / root)

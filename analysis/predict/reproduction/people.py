@@ -170,6 +170,6 @@ def published_of(studies: Drawn, paper: Paper) -> PublishedExperiment:
     return paper.preference if isinstance(studies, RatingStudies) else paper.direction
 
 
-def lacking(studies: Drawn, published: PublishedExperiment) -> list[str]:
+def missing_methods(studies: Drawn, published: PublishedExperiment) -> list[str]:
     """The methods of the paper that a study does without, so that its claims cannot recur."""
     return [method for method in published.methods if method not in studies.methods]

@@ -15,7 +15,7 @@ from analysis.stats.arrays import pingouin
 if TYPE_CHECKING:
     from analysis.predict.reproduction.results import Reproduced
 
-_RUN_S, _REPORT_S = 0.12, 6.0
+_RUN_S, _REPORT_S = 0.08, 5.0
 
 
 def reproduction_time_s(study: ReproducedStudy) -> float:

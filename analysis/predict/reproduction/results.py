@@ -15,7 +15,7 @@ from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.page import ATTENTION, ELSEWHERE, cut, other_rows, predictions
 from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
-from analysis.predict.reproduction.people import drawn_studies, lacking, published_of, table_name
+from analysis.predict.reproduction.people import drawn_studies, missing_methods, published_of, table_name
 from analysis.predict.reproduction.study import ReproducedStudy
 from analysis.predict.simulate.panels import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds
@@ -90,7 +90,7 @@ def _odds(study: ReproducedStudy) -> Iterator[PatternOdds]:
     for setup in study.setups:
         studies = drawn_studies(setup)
         published = None if studies is None else published_of(studies, study.paper)
-        if studies is not None and published is not None and not lacking(studies, published):
+        if studies is not None and published is not None and not missing_methods(studies, published):
             yield pattern_odds(studies, published, study.config.replications, study.seed)
 
 
@@ -143,7 +143,11 @@ def _notes(study: ReproducedStudy) -> Iterator[str]:
 def _without_odds(study: ReproducedStudy) -> Iterator[str]:
     for setup in study.setups if study.paper else ():
         studies = drawn_studies(setup)
-        missing = [] if studies is None or study.paper is None else lacking(studies, published_of(studies, study.paper))
+        missing = (
+            []
+            if studies is None or study.paper is None
+            else missing_methods(studies, published_of(studies, study.paper))
+        )
         if missing:
             name, methods = setup.config.design, ", ".join(missing)
             yield f"No odds of the published pattern of {name}: the study has no {methods}, which its claims are about."
