@@ -253,7 +253,7 @@ def test_json_gives_the_counts(recoil: Recoil, real: Path) -> None:
         "synthetic": 2,
         "runs": {"direction": 3, "preference": 3},
         "rows": {"direction": 180, "preference": 9},
-        "files": 12,
+        "files": 14,
         "left_out": [],
         "begun": [],
     }
