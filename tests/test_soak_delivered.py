@@ -50,6 +50,12 @@ def holding(courses: Courses, name: str, *, moving: bool = False) -> list[int]:
     return [who for who in held if not any(shot.rests for shot in shots.get(who, []))]
 
 
+def of_people(courses: Courses, name: str) -> str:
+    """How many people a figure is of, and how many were left out."""
+    held = len(holding(courses, name))
+    return f"{held} people" if held == PEOPLE else f"{held} of {PEOPLE} people, the others beyond the model's steps"
+
+
 def run_of(
     courses: Courses, name: str, slips: list[float], random: np.random.Generator, *, moving: bool = False
 ) -> list[str]:
@@ -66,7 +72,8 @@ def test_a_good_shot_is_marked_less_than_once_in_10000_through_the_whole_chain(
 ) -> None:
     random = np.random.default_rng(2)
     marks = sum(sum(map(bool, run_of(courses, name, [0.0] * SHOTS, random))) for _ in range(RUNS))
-    how = f"{marks} in {RUNS * SHOTS:,} shots of {PEOPLE} people by the physics, grips SD 10 % within and 25 % between"
+    shots = f"{marks} in {RUNS * SHOTS:,} shots of {of_people(courses, name)}"
+    how = f"{shots} by the physics, grips SD 10 % within and 25 % between"
     soak(f"{name}: false marks a shot, by physics and noise", f"{marks / RUNS / SHOTS:.1e}", "< 1e-4", how)
     assert marks / RUNS / SHOTS < 1e-4
 
@@ -108,7 +115,8 @@ def test_a_damper_that_slips_is_seen_within_so_many_shots(
         f"{name} slips by {100 * slip:.0f} %: seen within {shots} shots",
         f"{shares[True]:.3f} where the magnet moves on; {shares[False]:.3f} of all people",
         f"> {bound} where it moves on" if bound else "none",
-        f"{runs} runs each, after {GOOD} good shots; in firm hands the magnet rests at its turn",
+        f"{runs} runs each of {of_people(courses, name)}, after {GOOD} good shots; in firm hands the magnet rests "
+        f"at its turn: it moves on with {len(holding(courses, name, moving=True))}",
     )
     assert shares[True] >= bound
 
@@ -130,7 +138,7 @@ def test_a_slip_from_a_method_s_first_shot_on_is_seen_unless_the_magnet_rests(
         f"{found[True, 20]:.2f}, {found[True, 80]:.2f} where the magnet moves on; "
         f"{found[False, 20]:.2f}, {found[False, 80]:.2f} of all people",
         "> 0.8 in 80 shots where it moves on",
-        f"{runs} runs each",
+        f"{runs} runs each of {of_people(courses, name)}",
     )
     assert found[True, 80] > 0.8
 
