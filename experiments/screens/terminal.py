@@ -257,7 +257,7 @@ def _answers(position: Position, line: str) -> bool:
 
 def _keys(asked: Ask) -> str:
     """The answers with what is typed for each, as in “f = forward, b = backward”."""
-    return ", ".join(f"{one.key} = {one.label}" for one in asked.choices)
+    return ", ".join(f"{one.key} = {one.told}" for one in asked.choices)
 
 
 def _chosen(asked: Ask, line: str) -> str | None:

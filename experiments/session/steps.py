@@ -72,7 +72,7 @@ class Ask:
 
     def label(self, answer: AnswerValue) -> str:
         """What an answer is called."""
-        return next((choice.label for choice in self.choices if choice.answer == answer), str(answer))
+        return next((choice.told for choice in self.choices if choice.answer == answer), str(answer))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

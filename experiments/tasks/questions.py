@@ -31,6 +31,16 @@ class Choice:
     key: str
     own_key: str
 
+    @property
+    def told(self) -> str:
+        """What an experimenter reads: the label, and the answer's own name after one without a letter from a to z.
+
+        >>> [one.told for one in choices_of({"forward": "vorwärts", "backward": "向后", "3": "3"}, {})]
+        ['vorwärts', '向后 (backward)', '3']
+        """
+        foreign = self.answer != self.label and not any(letter in ascii_lowercase for letter in self.label.casefold())
+        return f"{self.label} ({self.answer})" if foreign else self.label
+
 
 def choices_of(labels: Mapping[str, str], own_keys: Mapping[str, str]) -> tuple[Choice, ...]:
     """The answers by their labels, the experimenter's keys by `free_keys`.

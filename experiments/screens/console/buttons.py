@@ -111,10 +111,10 @@ class AnswerButtons(QtWidgets.QWidget):
         for place, button in enumerate(self._buttons):
             button.setVisible(place in shown)
             if place in shown:
-                label = shorten(choices[place].label.upper(), MAX_LABEL // len(shown), placeholder="…")
+                label = shorten(choices[place].told.upper(), MAX_LABEL // len(shown), placeholder="…")
                 button.label(label, choices=choices)
-                button.setAccessibleName(choices[place].label)
-                button.setToolTip(choices[place].label)
+                button.setAccessibleName(choices[place].told)
+                button.setToolTip(choices[place].told)
 
 
 MAX_LABEL = 24

@@ -409,7 +409,7 @@ class Controls:
         key = keys.shown_key(name, letters=self.typing.letters, choices=self.choices)
         does = keys.BY_NAME[name].does
         if name in keys.ANSWERS:
-            does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].label)
+            does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].told)
         not_done = phrase("   – not now: {because}", because=not_now) if not_now else ""
         return f"{key:<8} {does}{not_done}"
 

@@ -274,7 +274,7 @@ def _asking(seen: Seen) -> Instruction:
     if not isinstance(step, Ask):
         return _MOMENT
     own_keys = either(
-        phrase("{own_key} for {label}", own_key=one.own_key.upper(), label=one.label) for one in step.choices
+        phrase("{own_key} for {label}", own_key=one.own_key.upper(), label=one.told) for one in step.choices
     )
     own = phrase(
         "Awaited: the participant's own key, {own_keys}.\n{keys} enters it for them.",
