@@ -129,8 +129,10 @@ def reconstruct(wanted: Constraints, seed: int = 0, *, count: int = 1, starts: i
 
     The same for the same seed. `exists` is False only by proof: every data set, or every sum, was looked at.
 
-    >>> from analysis.paper.audit.means import scale_of
-    >>> found = reconstruct(printed_constraints(5, ["2.40"], scale_of("1", "0", "6"), sds=["1.52"]), count=9)
+    >>> from analysis.paper.audit.printed import Rounding, read_printed
+    >>> spread = read_printed("1.52").interval(Rounding.HALF_UP).squared()
+    >>> five = Constraints(n=5, top=6, columns=(ConditionColumn(sums=[12], variance=spread),))  # a mean of 2.40
+    >>> found = reconstruct(five, count=9)
     >>> found.space, sorted(sorted(value for (value,) in rows) for rows in found.data)
     (3, [[0, 2, 3, 3, 4], [1, 1, 2, 4, 4], [1, 2, 2, 2, 5]])
     """
