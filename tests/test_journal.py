@@ -413,3 +413,12 @@ def test_a_part_left_by_a_crash_does_not_stand_in_the_way(tmp_path: Path) -> Non
     (tmp_path / ".table.csv.part").write_bytes(b"half")
     storage.write_whole(tmp_path / "table.csv", b"whole")
     assert (tmp_path / "table.csv").read_bytes() == b"whole"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_that_is_called_a_journal_keeps_nobody_waiting(tmp_path: Path) -> None:
+    os.mkfifo(pipe := tmp_path / f"sub-P01_task-direction{ENDING}")
+    with pytest.raises(JournalError, match=r"cannot be read \(it is no file\)"):
+        read_journal(pipe)
+    with pytest.raises(OSError, match="it is no file"):
+        storage.is_held(pipe)

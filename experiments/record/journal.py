@@ -361,6 +361,7 @@ def head(path: Path) -> Head | None:
 def journal_bytes(path: Path) -> bytes:
     """The bytes of a journal. `JournalError` if there are none to be had."""
     try:
+        storage.check_file(path)
         return path.read_bytes()
     except OSError as error:
         raise JournalError(f"{path}: cannot be read ({error.strerror})") from error

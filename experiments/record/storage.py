@@ -6,7 +6,9 @@ modes do not exist, so the folder's own permissions count there.
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -57,6 +59,13 @@ def moved_to(descriptor: int) -> Path | None:
     except OSError:
         return None
     return path if is_at(descriptor, path) else None
+
+
+def check_file(path: Path) -> None:
+    """`OSError` where there is no file: to open a pipe would wait for ever for somebody to write to it."""
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise OSError(errno.EINVAL, "it is no file", str(path))
 
 
 def read_open(descriptor: int, length: int) -> bytes:
@@ -112,6 +121,7 @@ _AGAIN_S = 0.01
 
 def is_held(path: Path) -> bool:
     """Whether somebody holds a file. To find out it is held for a moment, which others who only look do not notice."""
+    check_file(path)
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
     try:
         return not _locked(descriptor, shared=True)
