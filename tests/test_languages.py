@@ -16,6 +16,7 @@ from babel.messages.pofile import read_po, write_po
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.archive.pages import ArchivedDesign, methods
 from analysis.logs.journals import RunFile
 from analysis.summary.languages import unchecked_languages
 from experiments.catalogues import catalogue
@@ -40,7 +41,7 @@ from experiments.design.planning import plan_of
 from experiments.design.shown_texts import letters_of, setup_in, shown_texts, texts_in
 from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.load import load_setup
-from experiments.record.journal import read_journal
+from experiments.record.journal import ShownLanguage, read_journal
 from experiments.run import RunRequest, gone_on_with, run
 from experiments.screens import phrases as phrases_of_the_console
 from experiments.screens import texts
@@ -483,6 +484,18 @@ def test_the_report_names_who_saw_unchecked_texts_and_nobody_else(tmp_path, fold
     assert list(unchecked_languages(runs)) == [
         "preference: A saw and heard zh (中文), in texts that no native speaker had checked"
     ]
+
+
+def test_the_methods_section_of_an_archive_says_who_was_spoken_to_in_a_translation():
+    setup = load_setup("preference")
+    shown = ShownLanguage(code="zh", name="中文", checked_by="", messages={}, texts={})
+    spoken = (shown, shown, replace(shown, code="de", name="Deutsch", checked_by="somebody"))
+    done = ArchivedDesign(design=setup.config, gun=setup.gun, participants=tuple("ABCD"), spoken=spoken)
+    assert methods([done]).decode().split("\n")[-4::2] == [
+        "1 of 4 saw and heard all of it in a translation, de (Deutsch), checked by a native speaker.",
+        "2 of 4 saw and heard all of it in a translation, zh (中文), which no native speaker had checked.",
+    ]
+    assert "translation" not in methods([replace(done, spoken=())]).decode()
 
 
 def run_file(place, code):

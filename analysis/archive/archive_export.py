@@ -244,7 +244,8 @@ def _designs(runs: Iterable[_Run]) -> list[ArchivedDesign]:
         setup = head.setup_json if isinstance(head.setup_json, dict) else {}
         gun = checked_table(GunConfig, setup.get("gun", {}), f"{head.path}: line 1")
         codes = tuple(run.code for run in some)
-        found.append(ArchivedDesign(design=began_with(head), gun=gun, participants=codes))
+        spoken = tuple(run.contents.head.language for run in some if run.contents.head.language is not None)
+        found.append(ArchivedDesign(design=began_with(head), gun=gun, participants=codes, spoken=spoken))
     return found
 
 

@@ -14,17 +14,19 @@ from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
 from experiments.design.planned import runs_of_groups
+from experiments.record.journal import ShownLanguage
 
 CITATION = "CITATION.cff"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArchivedDesign:
-    """A design with the gun that it ran on, and who did it with whom of them finished."""
+    """A design with the gun that it ran on, who did it, and who of them in another language than the design's."""
 
     design: DesignConfig
     gun: GunConfig
     participants: tuple[str, ...]
+    spoken: tuple[ShownLanguage, ...] = ()
 
 
 _README = """# {title}
@@ -130,6 +132,15 @@ def _method(one: ArchivedDesign) -> Iterator[str]:
     yield f"Experiment `{one.design.design}`, {count} participant{'' if count == 1 else 's'}; gun: {one.gun.title}.\n"
     for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun)):
         yield f"{paragraph}\n"
+    yield from _translations(one)
+
+
+def _translations(one: ArchivedDesign) -> Iterator[str]:
+    """Who was spoken to in another language, and whether anybody who speaks it has checked the words."""
+    found = Counter((shown.code, shown.name, bool(shown.checked_by)) for shown in one.spoken)
+    for (code, name, checked), people in sorted(found.items()):
+        by = "checked by a native speaker" if checked else "which no native speaker had checked"
+        yield f"{people} of {len(one.participants)} saw and heard all of it in a translation, {code} ({name}), {by}.\n"
 
 
 def citation(title: str, version: str) -> bytes:
