@@ -17,7 +17,7 @@ from device.plugin.guard import PluginError
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorLink
 from device.sensor.measuring import DeliveredShot
-from device.sensor.process import SampleBuffer, ShotAsked
+from device.sensor.process import LOOK_EVERY_S, UNHEARD_S, SampleBuffer, SensorSilence, ShotAsked
 from device.sensor.streams import CsvSensor, SensorClock, SensorError, checked_samples
 from tests.delivered_chain import DAMPED, RATE_HZ, stream_written
 from tests.gun_plugins import ACCELEROMETER, install_sensor
@@ -102,9 +102,65 @@ def test_a_trace_with_a_gap_or_without_an_end_is_not_measured():
     assert "gap of 0.02" in reply.because
     late = replace(asked, pulse_start_s=1.99)
     assert buffer.reply_to(late, 2.0) is None
-    reply = buffer.reply_to(late, 4.0)
+    assert buffer.reply_to(late, 4.0) is None  # not yet two seconds after its end
+    reply = buffer.reply_to(late, 5.0)
     assert reply is not None
     assert reply.because == "the sensor gave no samples of it"
+
+
+# silence
+
+
+def looked(spans: list[tuple[str, float]]) -> list[bool]:
+    """What looks at even times say of a sensor that gives batches or nothing, hangs, or is not asked, in turn."""
+    silence, now_s, said = SensorSilence(), 0.0, list[bool]()
+    silence.answered(1)
+    said.append(silence.look(now_s))
+    for what, span_s in spans:
+        if what == "late":  # this process stands still: nothing is looked at either
+            now_s += span_s
+        for _ in range(1 if what == "late" else round(span_s / LOOK_EVERY_S)):
+            if what in ("gives", "nothing"):
+                silence.ask()
+                silence.answered(what == "gives")
+            elif what == "hangs":
+                silence.ask()
+            now_s += LOOK_EVERY_S
+            said.append(silence.look(now_s))
+        if what == "hangs":
+            silence.answered(0)
+    return said
+
+
+@pytest.mark.parametrize("what", ["nothing", "hangs"])
+def test_a_sensor_that_was_asked_in_vain_or_hangs_is_silent_after_the_limit_and_no_sooner(what: str):
+    assert not any(looked([(what, UNHEARD_S)]))
+    said = looked([("gives", 1.0), (what, UNHEARD_S + 2 * LOOK_EVERY_S), ("gives", LOOK_EVERY_S)])
+    assert said[-2:] == [True, False]
+
+
+@pytest.mark.parametrize(
+    "spans",
+    [
+        [("nothing", 0.8), ("gives", LOOK_EVERY_S)] * 5,  # batches
+        [("hangs", 1.0), ("gives", LOOK_EVERY_S)] * 5,  # each read takes a second
+        [("measures", 30.0), ("gives", LOOK_EVERY_S)],  # it is not asked meanwhile
+        [("nothing", 1.0), ("late", 30.0), ("nothing", LOOK_EVERY_S), ("gives", LOOK_EVERY_S)],
+        [("hangs", 1.0), ("late", 30.0), ("gives", LOOK_EVERY_S)],
+    ],
+)
+def test_batches_slow_reads_and_our_own_lateness_are_no_silence(spans: list[tuple[str, float]]):
+    assert not any(looked(spans))
+
+
+def test_a_shot_is_not_given_up_while_only_this_machine_was_late():
+    buffer, asked = SampleBuffer(), ShotAsked(number=1, pulse_start_s=1.0, actuator=DAMPED)
+    buffer.take([(t, 0.0) for t in np.arange(0.0, 1.0, 1 / RATE_HZ).tolist()], 1.0)
+    assert buffer.reply_to(asked, 1.0) is None  # however late it is now, it was asked last before the shot was over
+    buffer.take([(t, 0.0) for t in np.arange(1.0, 4.0, 1 / RATE_HZ).tolist()], 9.0)
+    reply = buffer.reply_to(asked, 9.0)
+    assert reply is not None
+    assert reply.because == ""
 
 
 # plug-ins

@@ -13,15 +13,21 @@ import numpy as np
 
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorSaid, asked_of, said_line
-from device.sensor.process import LEAST_RATE_HZ, SAMPLES_S, SampleBuffer, SensorReady, ShotAsked
+from device.sensor.process import (
+    LEAST_RATE_HZ,
+    LOOK_EVERY_S,
+    SAMPLES_S,
+    SampleBuffer,
+    SensorReady,
+    SensorSilence,
+    ShotAsked,
+)
 from device.sensor.streams import Sensor, SensorError, checked_samples
 from device.words import DeviceError
 
 READ_EVERY_S = 0.005, 0.015
 """It is read at uneven times: a sensor whose batches come evenly would else always be heard equally late."""
 _RANDOM = np.random.default_rng()
-UNHEARD_S = 1.0
-"""A sensor that gave no sample for so long is silent."""
 FIRST_SAMPLES_S = 5.0
 """So long a sensor that was opened may take until it has given a second of samples."""
 
@@ -30,19 +36,19 @@ def serve_sensor(address: str, out: int) -> None:
     """Read the sensor, and answer what stdin asks. `DeviceError`, `ValueError`: why it ended."""
     sensor = open_sensor(address, time.monotonic)
     try:
-        buffer = SampleBuffer()
-        _become_ready(sensor, buffer)
+        buffer, silence = SampleBuffer(), SensorSilence()
+        _become_ready(sensor, buffer, silence)
         ready = SensorReady(rate_Hz=buffer.rate_Hz, noise_m_s2=buffer.noise_m_s2())
         os.write(out, said_line(SensorSaid(ready=ready)))
         asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
         threading.Thread(target=_listen, args=(asked,), daemon=True).start()
-        threading.Thread(target=_watch, args=(buffer, out), daemon=True).start()
+        threading.Thread(target=_watch, args=(silence, out), daemon=True).start()
         waiting = deque[ShotAsked]()
         while True:
-            _read(sensor, buffer)
+            asked_s = _read(sensor, buffer, silence)
             while not asked.empty():
                 waiting.append(asked.get())
-            while waiting and (reply := buffer.reply_to(waiting[0], time.monotonic())):
+            while waiting and (reply := buffer.reply_to(waiting[0], asked_s)):
                 waiting.popleft()
                 os.write(out, said_line(SensorSaid(reply=reply)))
             time.sleep(_RANDOM.uniform(*READ_EVERY_S))
@@ -50,20 +56,26 @@ def serve_sensor(address: str, out: int) -> None:
         sensor.close()
 
 
-def _read(sensor: Sensor, buffer: SampleBuffer) -> None:
+def _read(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> float:
+    """Take what it gives; back comes when it was asked."""
+    asked_s = time.monotonic()
+    silence.ask()
     try:
         said: object = sensor.read()
     except DeviceError:
         raise
     except Exception as error:
         raise SensorError(f"it broke off: {type(error).__name__}: {error}") from error
-    buffer.take(checked_samples("read", said, buffer.last_s), time.monotonic())
+    samples = checked_samples("read", said, buffer.last_s)
+    silence.answered(len(samples))
+    buffer.take(samples, time.monotonic())
+    return asked_s
 
 
-def _become_ready(sensor: Sensor, buffer: SampleBuffer) -> None:
+def _become_ready(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> None:
     end_s = time.monotonic() + FIRST_SAMPLES_S
     while buffer.length_s < SAMPLES_S:
-        _read(sensor, buffer)
+        _read(sensor, buffer, silence)
         if time.monotonic() > end_s:
             raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s; is it on?")
         time.sleep(_RANDOM.uniform(*READ_EVERY_S))
@@ -71,12 +83,12 @@ def _become_ready(sensor: Sensor, buffer: SampleBuffer) -> None:
         raise SensorError(f"it gives {buffer.rate_Hz:.0f} samples a second; at least {LEAST_RATE_HZ:g} are needed")
 
 
-def _watch(buffer: SampleBuffer, out: int) -> None:
+def _watch(silence: SensorSilence, out: int) -> None:
     """Say when samples come no more, and again: beside the reading, which may hang."""
     silent = False
     while True:
-        time.sleep(UNHEARD_S / 5)
-        if silent != (silent := time.monotonic() > buffer.heard_s + UNHEARD_S):
+        time.sleep(LOOK_EVERY_S)
+        if silent != (silent := silence.look(time.monotonic())):
             os.write(out, said_line(SensorSaid(silent=silent)))
 
 

@@ -20,7 +20,7 @@ from typing import Protocol
 from pydantic import TypeAdapter, ValidationError
 
 from device.methods import Method
-from device.sensor.process import SAMPLES_S, SensorReady, ShotAsked, ShotReply
+from device.sensor.process import UNHEARD_S, SensorReady, ShotAsked, ShotReply
 from device.sensor.streams import SensorError
 
 START_S = 30.0
@@ -108,7 +108,7 @@ class SensorLink:
             self._process.stdin.flush()
         except OSError:
             pass  # it has ended, and says why below
-        wait_s = max(0.0, pulse_start_s - time.monotonic()) + _LONGEST_S + SAMPLES_S + SENSOR_ANSWER_S
+        wait_s = max(0.0, pulse_start_s - time.monotonic()) + _LONGEST_S + UNHEARD_S + SENSOR_ANSWER_S
         reply = self._heard(wait_s, "does not answer").reply
         if reply is None or reply.number != self._count:
             raise SensorError(f"{self.address}: answered another shot than it was asked for")

@@ -17,7 +17,11 @@ from device.sensor.streams import ClockLine, Sample, SensorClock
 KEPT_S = 5.0
 """Samples of so long are kept."""
 SAMPLES_S = 1.0
-"""A shot whose trace is not whole so long after its end is not measured. A sensor is ready once it gave so much."""
+"""A sensor is ready once it gave so much."""
+UNHEARD_S = 2.0
+"""A sensor that was asked and gave no sample for so long is silent, and shots that it gave none of are not measured."""
+LOOK_EVERY_S = 0.2
+"""So often it is looked whether a sensor is silent."""
 LEAST_RATE_HZ = 1500.0
 """With fewer samples a second the recoil's peak, which is over in 2 ms, is lost between them."""
 MAX_GAP_S = 0.005
@@ -52,16 +56,43 @@ class ShotReply:
     because: str = ""
 
 
-class SampleBuffer:
-    """The last samples, and what they show. Times are the sensor's own until a shot is looked for.
+class SensorSilence:
+    """Whether a sensor gives nothing, looked at every `LOOK_EVERY_S` beside the reading, which may hang.
 
-    `heard_s`: when the last came, on this machine's clock.
+    Only time in which it was asked counts: none in which this process stood still, or was busy with a shot.
     """
+
+    def __init__(self) -> None:
+        self._asking, self._full, self._empty = False, 0, 0  # of the reading alone
+        self._seen, self._looked_s, self._length_s = (0, 0), -np.inf, 0.0  # of the looking alone
+
+    def ask(self) -> None:
+        """A read begins."""
+        self._asking = True
+
+    def answered(self, samples: int) -> None:
+        """A read ended with so many samples."""
+        self._full, self._empty = self._full + (samples > 0), self._empty + (samples == 0)
+        self._asking = False
+
+    def look(self, now_s: float) -> bool:
+        """Whether it is silent now."""
+        asking, (full, empty) = self._asking, self._seen
+        self._seen = self._full, self._empty
+        passed_s, self._looked_s = min(now_s - self._looked_s, 2 * LOOK_EVERY_S), now_s
+        if self._seen[0] > full:
+            self._length_s = 0.0
+        elif asking or self._seen[1] > empty:
+            self._length_s += passed_s
+        return self._length_s > UNHEARD_S
+
+
+class SampleBuffer:
+    """The last samples, and what they show. Times are the sensor's own until a shot is looked for."""
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque()
         self._clock = SensorClock()
-        self.heard_s = -np.inf
 
     @property
     def last_s(self) -> float:
@@ -83,7 +114,6 @@ class SampleBuffer:
         if not samples:
             return
         self._samples.extend(samples)
-        self.heard_s = now_s
         self._clock.heard(self.last_s, now_s)
         while self.length_s > KEPT_S:
             self._samples.popleft()
@@ -93,19 +123,19 @@ class SampleBuffer:
         values = np.array([value for _, value in self._samples])
         return float(np.median([part.std() for part in np.array_split(values, max(1, round(20 * self.length_s)))]))
 
-    def reply_to(self, shot: ShotAsked, now_s: float) -> ShotReply | None:
-        """What was measured of a shot; `None` as long as its trace is not whole."""
+    def reply_to(self, shot: ShotAsked, asked_s: float) -> ShotReply | None:
+        """What was measured of a shot by the read begun at `asked_s`; `None` as long as its trace is not whole."""
         expected = expected_shot(shot.actuator, _stepped(self.rate_Hz)) if self.rate_Hz > LEAST_RATE_HZ else None
         if expected is None:
             why = "nothing moves in this shot by the model" if self.rate_Hz > LEAST_RATE_HZ else "too few samples"
             return ShotReply(number=shot.number, because=why)
         reply = ShotReply(number=shot.number, expected=expected)
         end_s = shot.pulse_start_s + expected.until_s
-        if now_s < end_s:
+        if asked_s < end_s:
             return None
         line = self._clock.line()
         if line.host_s(np.array(self.last_s)) < end_s:
-            late = now_s > end_s + SAMPLES_S
+            late = asked_s > end_s + UNHEARD_S
             return replace(reply, because="the sensor gave no samples of it") if late else None
         try:
             trace = self._trace(line, shot.pulse_start_s - BEFORE_S, end_s)
