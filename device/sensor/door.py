@@ -35,3 +35,12 @@ def open_sensor(address: str, clock: Callable[[], float]) -> Sensor:
         raise SensorError(f"{who} did not open {rest!r}: {type(error).__name__}: {error}") from error
     check_commands(who, sensor, SENSOR_COMMANDS, "a sensor")
     return cast("Sensor", sensor)
+
+
+def check_address(address: str) -> None:
+    """Whether there is such a file or plug-in, which is not imported. Raises as `open_sensor`."""
+    name, _, rest = address.partition(":")
+    if name == "csv":
+        CsvSensor(rest).close()
+    else:
+        entry_of(name, SENSOR_PLUGINS)

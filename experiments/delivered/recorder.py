@@ -17,12 +17,13 @@ import numpy as np
 from device import Gun, GunStatus, Shot, ShotReport
 from device.methods import Method
 from device.parameters import GunParameters
+from device.sensor.door import check_address
 from device.sensor.link import SensorEnd, SensorLink
 from device.sensor.measuring import DeliveredShot, ExpectedShot
 from device.sensor.process import ShotReply
 from device.sensor.simulated import SimulatedSensor, measures_by_model
 from device.sensor.streams import SensorError
-from device.words import Identity, Pulse
+from device.words import DeviceError, Identity, Pulse
 from experiments.clock import Clock
 from experiments.delivered.marks import MethodLevels, ShotParts, ShotVerdict, judged_shot
 from experiments.live_run import LiveRun, Screen
@@ -55,11 +56,7 @@ def open_recorder(
     """The recorder of a run. `SensorError`: the sensor is refused, or can measure no such gun on no such clock."""
     simulated = measures_by_model(address)
     if not simulated and clock.name != "real":
-        raise SensorError(
-            f"--sensor {address}: measures in real time, and this run's clock is {clock.name}; give --sensor "
-            "simulated, or --screen terminal or console with a gun that takes its time (with --screen synthetic none "
-            "passes)"
-        )
+        raise _out_of_time(address, clock)
     try:
         end: SensorEnd = SimulatedSensor(address, gun, random) if simulated else SensorLink(address)
     except SensorError as error:
@@ -70,6 +67,18 @@ def open_recorder(
     finally:
         recorder.settle()
         recorder.close()
+
+
+def _out_of_time(address: str, clock: Clock) -> SensorError:
+    """Why such a sensor measures nothing on such a clock; first, that there is none of that name or path."""
+    try:
+        check_address(address)
+    except (DeviceError, ValueError) as error:
+        return SensorError(f"--sensor {address}: {error}")
+    return SensorError(
+        f"--sensor {address}: measures in real time, and this run's clock is {clock.name}; give --sensor simulated, or "
+        "--screen terminal or console with a gun that takes its time (with --screen synthetic none passes)"
+    )
 
 
 class ShotRecorder:
