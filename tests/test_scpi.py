@@ -5,6 +5,8 @@ The twin and the firmware on the emulated chip are driven by the same program, t
 
 from __future__ import annotations
 
+import re
+import runpy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +23,8 @@ from tests.waiting import wait_for
 
 COMPLETE, DEVICE, EXECUTION, COMMAND, POWER_ON = 1, 8, 16, 32, 128
 """IEEE 488.2-1992, figure 11-6."""
+
+DRIVER = Path(__file__).parent.parent / "docs/howto/driver.md"
 
 
 @pytest.fixture
@@ -194,6 +198,38 @@ def test_pyvisa_drives_the_twin(tmp_path: Path, tcp: bool) -> None:
         port = socket.address.rpartition(":")[2]
         with instrument(f"TCPIP::127.0.0.1::{port}::SOCKET" if tcp else f"ASRL{socket.address}::INSTR") as gun:
             a_session(gun)
+
+
+def test_the_program_of_the_page_fires_whenever_it_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (program,) = re.findall(r"```python hardware\n(.*?)```", DRIVER.read_text(encoding="utf-8"), re.DOTALL)
+    with a_twin(tmp_path, speed=1.0, tcp=True, rested=True) as (_, socket):
+        script = tmp_path / "program.py"
+        script.write_text(program.replace("5025", socket.address.rpartition(":")[2]), encoding="utf-8")
+        runpy.run_path(str(script))
+        runpy.run_path(str(script))
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split(",")[0::2][:2] for line in said if line.startswith("SHOT")] == [
+        ["SHOT 1", "DONE"],
+        ["SHOT 2", "DONE"],
+    ]
+    assert said.count('0,"No error"') == 2
+
+
+@pytest.mark.parametrize("line", ["*esr?", "SYSTEM:VERSION?", "*IDN?;*OPC?"])
+def test_commands_are_taken_in_short_capitals_one_a_line(hand: Hand, line: str) -> None:
+    hand.say(line)
+    assert hand.say("SYST:ERR?") == [message(-113)]
+
+
+def test_the_last_shot_s_name_outlives_a_reset_and_none_always_fires(hand: Hand) -> None:
+    hand.say("TRIG 1")
+    for line in ("*RST", PULSE):
+        hand.say(line, 300_000)
+    hand.say("ARM", READY)
+    hand.say("TRIG 1")
+    assert hand.say("SYST:ERR?") == [message(113)]
+    hand.say("TRIG")
+    assert hand.say("SYST:ERR?") == [message(0)]
 
 
 @pytest.mark.slow
