@@ -19,7 +19,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PyQt6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
 from PyQt6.QtGui import QKeyEvent, QWheelEvent
 from PyQt6.QtTest import QTest
-from PyQt6.QtWidgets import QApplication, QPushButton, QWidget
+from PyQt6.QtWidgets import QApplication, QPushButton, QScrollArea, QWidget
 
 from experiments.catalogues.catalogue import ENGLISH, language
 from experiments.clock import RealClock, VirtualClock
@@ -42,6 +42,7 @@ pytestmark = pytest.mark.slow
 
 FACTS = Facts(age_years=25, sex="female", handedness="right")
 PATIENCE_S = 60
+TITLE_BAR_PX = 24
 SERIAL = "serial:/dev/nowhere"
 
 
@@ -705,6 +706,17 @@ def test_where_there_are_several_monitors_the_participants_is_chosen_by_its_numb
     key(window, "Return", CTRL)
     assert window.choice is not None
     assert window.choice.options.monitor == 0
+
+
+def test_every_field_that_there_can_be_is_seen_at_once(opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.screens.console.form.monitors", lambda: ["0: eDP-1", "1: HDMI-1"])
+    window = opened(languages=(ENGLISH, language("zh")))
+    window.resize(1280, 800 - TITLE_BAR_PX)
+    window.form.remark.say("a remark\nof two lines", "ask")
+    assert window.form.monitor.isVisible()
+    bar = window.form.findChild(QScrollArea).verticalScrollBar()
+    assert bar is not None
+    until(lambda: bar.maximum() == 0)
 
 
 def test_a_ticked_box_shows_a_tick(opened: Open) -> None:

@@ -24,6 +24,8 @@ _LEVELS: dict[str, tuple[str, ...]] = {"sex": get_args(Sex), "handedness": get_a
 _FACT_TEXT = {"age_years": phrase("Age in years"), "sex": phrase("Sex"), "handedness": phrase("Handedness")}
 _HOW_TO_START = phrase("Read the code back with the participant, fill in what is asked, then Start.")
 _AGE_DIGITS = 3
+_BETWEEN_ROWS_PX = 3
+"""So every field that there can be has room at 1280 × 800, below a title bar, a long path and a long remark."""
 SENDS_MARKERS = phrase("sends markers (LSL)")
 _NO_SENSOR = phrase("none; csv:PATH or another")
 
@@ -62,6 +64,9 @@ class Form(QtWidgets.QFrame):
         form = QtWidgets.QFormLayout(fields := QtWidgets.QWidget())
         fields.setObjectName("form")
         form.setRowWrapPolicy(QtWidgets.QFormLayout.RowWrapPolicy.WrapLongRows)
+        margins = form.contentsMargins()
+        form.setContentsMargins(margins.left(), 0, margins.right(), 0)
+        form.setVerticalSpacing(_BETWEEN_ROWS_PX)
         form.setFieldGrowthPolicy(QtWidgets.QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         for name, widget in self._rows():
             widget.setAccessibleName(name)
