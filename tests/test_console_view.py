@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -20,10 +23,11 @@ from experiments.load import load_setup
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.progress import trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
+from experiments.screens.texts import ends_text
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Prepare, Present, Presented, Repeated, Rest
+from experiments.session.steps import Answered, Asking, Prepare, Present, Presented, Repeated, Rest
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 
@@ -104,6 +108,51 @@ def test_whoever_looks_finds_the_word_they_need_in_each_state(tmp_path: Path) ->
         with sat_at(state, tmp_path / state) as sitting:
             sitting.window.paint()
             assert any(word in text for text in sitting.window.heard), (state, sitting.window.heard)
+
+
+# a participant's language from right to left
+
+
+QUESTION = "أي اتجاه؟"
+
+
+def reads_from_the_left(text: str) -> bool:
+    """Whether each line begins at the left: its first letter outside isolates, if it has one, is not from the right."""
+    outside = re.sub("\u2068[^\u2068\u2069]*\u2069", "", text)
+    ways = ([unicodedata.bidirectional(letter) for letter in line] for line in outside.splitlines())
+    return all(next((way for way in line if way in ("L", "R", "AL")), "L") == "L" for line in ways)
+
+
+@pytest.mark.parametrize("make_step", [ask, rate, describe])
+@pytest.mark.parametrize("there", [False, True])
+def test_what_the_console_says_in_english_keeps_its_sides_beside_a_question_from_the_right(
+    make_step: Callable[[Trial], Asking], there: bool
+) -> None:
+    step = replace(make_step(plan_of(PREFERENCE).trials[0]), text=QUESTION)
+    here = seen(PREFERENCE, Position(states=(State.RATING if step.kind != "ask" else State.ASKING,), step=step))
+    asked = view.instruction(replace(here, about=replace(here.about, participant_rates=there, participant_keys=there)))
+    assert not reads_from_the_left(QUESTION)
+    assert QUESTION in f"{asked.title}\n{asked.detail}"
+    assert reads_from_the_left(asked.title)
+    assert reads_from_the_left(asked.detail)
+
+
+def test_a_scale_whose_ends_are_from_the_right_keeps_its_low_end_on_the_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("PyQt6")
+    monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")
+    from PyQt6.QtGui import QTextLayout
+
+    from experiments.screens.console.app import application
+
+    application()
+    scale = replace(rate(plan_of(PREFERENCE).trials[0]), minimum_text="لا أحبه", maximum_text="أحبه")
+    shown = ends_text(scale)
+    layout = QTextLayout(shown)
+    layout.beginLayout()
+    line = layout.createLine()
+    layout.endLayout()
+    low, high = (line.cursorToX(shown.index(end))[0] for end in ("0 =", "10 ="))
+    assert low < high
 
 
 # what is told

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from gettext import NullTranslations
 
 CATALOGUE = NullTranslations()
@@ -18,4 +19,15 @@ def phrase(text: str, /, **values: object) -> str:
     'Trial 2 of 20'
     """
     said = CATALOGUE.gettext(text)
-    return said.format(**values) if values else said
+    beside = {name: isolated(value) if isinstance(value, str) else value for name, value in values.items()}
+    return said.format(**beside) if values else said
+
+
+def isolated(text: str) -> str:
+    r"""A text with letters from right to left between Unicode's isolates: what stands around it keeps its sides.
+
+    >>> isolated("left"), isolated("א") == "\N{FIRST STRONG ISOLATE}א\N{POP DIRECTIONAL ISOLATE}"
+    ('left', True)
+    """
+    turned = any(unicodedata.bidirectional(letter) in ("R", "AL") for letter in text)
+    return f"\N{FIRST STRONG ISOLATE}{text}\N{POP DIRECTIONAL ISOLATE}" if turned else text

@@ -10,7 +10,7 @@ import unicodedata
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.design.language import LARGEST_NUMBER, shown_level
 from experiments.design.plan import Plan, Trial
-from experiments.screens.phrases import phrase
+from experiments.screens.phrases import isolated, phrase
 from experiments.session import remarks, steps
 from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
@@ -124,7 +124,7 @@ def read_out_text(plan: Plan, step: Prepare) -> str:
     if not step.instruction:
         return ""
     how = phrase("READ OUT") if plan.opens_set(step.trial) else phrase("Instruction of this set")
-    return f"\n  {how}: “{step.instruction}”"
+    return f"\n  {how}: “{isolated(step.instruction)}”"
 
 
 def value_text(asked: Asking, said: AnswerValue) -> str:
@@ -139,7 +139,8 @@ def value_text(asked: Asking, said: AnswerValue) -> str:
 def ends_text(asked: Rate) -> str:
     """The ends of a scale in words, or which numbers may be said."""
     if asked.minimum_text or asked.maximum_text:
-        return f"{asked.minimum:g} = {asked.minimum_text}     {asked.maximum:g} = {asked.maximum_text}"
+        low, high = isolated(asked.minimum_text), isolated(asked.maximum_text)
+        return f"{asked.minimum:g} = {low}     {asked.maximum:g} = {high}"
     low = "above 0" if 0 < asked.minimum <= _TINY else phrase("from {minimum:g}", minimum=asked.minimum)
     low = "" if asked.minimum <= -LARGEST_NUMBER else low
     high = "" if asked.maximum >= LARGEST_NUMBER else phrase("to {maximum:g}", maximum=asked.maximum)
@@ -159,7 +160,7 @@ def entry_text(plan: Plan, told: History, entry: Asking) -> str:
     """An entry with what it says."""
     about = about_text(plan, entry)
     name = about if isinstance(entry, Ask) else f"{about}, {what(entry)}"
-    return f"{name}: {value_text(entry, entered_value(told, entry))}"
+    return f"{name}: {isolated(value_text(entry, entered_value(told, entry)))}"
 
 
 def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
@@ -203,7 +204,7 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
 
 def _entered_text(plan: Plan, step: Asking, value: AnswerValue) -> str:
     said = "description" if isinstance(step, Describe) else value_text(step, value)
-    return f"{about_text(plan, step)}: {said}"
+    return f"{about_text(plan, step)}: {isolated(said)}"
 
 
 def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:

@@ -16,7 +16,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, choices_at, shown_key
-from experiments.screens.phrases import phrase
+from experiments.screens.phrases import isolated, phrase
 from experiments.session.history import History, entered_value, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
@@ -283,8 +283,8 @@ def _asking(seen: Seen) -> Instruction:
     )
     told = phrase("Enter what the participant says: {keys}.", keys=_keys(step))
     there = _asked_there(seen, own, told) if seen.about.participant_keys else told
-    about = texts.ordinal(seen.about.plan, step.trial, seen.about.messages) if step.later else ""
-    return Instruction(title=step.text, detail="\n".join(filter(None, (about, there))), mood="ask")
+    about = _order_told(seen, step) if step.later else ""
+    return Instruction(title=isolated(step.text), detail="\n".join(filter(None, (about, there))), mood="ask")
 
 
 def _keys(asked: Ask) -> str:
@@ -317,9 +317,14 @@ def _rating(seen: Seen) -> Instruction:
     kind = what(step)
     own = phrase("Awaited: the participant's {kind} on their own screen, or type it here.", kind=kind)
     there = _asked_there(seen, own, phrase("Type here what they say.")) if seen.about.participant_rates else ""
-    about = texts.ordinal(seen.about.plan, step.trial, seen.about.messages)
-    title, *more = (about, step.text) if step.later else (step.text,)
+    question = isolated(step.text)
+    title, *more = (_order_told(seen, step), question) if step.later else (question,)
     return Instruction(title=title, detail="\n".join(filter(None, (*more, there))), mood="ask")
+
+
+def _order_told(seen: Seen, step: Asking) -> str:
+    """Which stimulus it is about, in the participant's words: it is read out."""
+    return isolated(texts.ordinal(seen.about.plan, step.trial, seen.about.messages))
 
 
 def _telling(seen: Seen) -> Instruction:
