@@ -24,7 +24,7 @@ from device.physics.equations import (
     StepSeries,
     grip,
 )
-from device.physics.polynomial import first_crossing, lower_bound, value_at, value_at_end
+from device.physics.polynomial import first_crossing, least_sum, least_sum_past_first, value_at, value_at_end
 from device.physics.series import (
     clear,
     expand,
@@ -41,24 +41,22 @@ _TRY_AGAIN = 400.0  # the same, until the next look at series that did not settl
 _SLAVED = 0.02  # the current follows the motion if L/R is at most this part of the motion's own time
 
 
-def motion_rate(p: Constants, s: ShotState) -> float:
+def motion_rate(p: Constants, u: float, x: float, v: float, i: float) -> float:
     """How fast the motion itself changes, in 1/s: braking by the back-EMF, the force's fading along x, the spring."""
-    current = abs(s.u) / p.resistance + abs(s.i)
-    braking = braking_rate(p, grip(p, s.x))
-    fading = math.sqrt(p.motor_constant * current / (p.coil_reach * p.mass)) + abs(s.v) / p.coil_reach
+    current = abs(u) / p.resistance + abs(i)
+    braking = braking_rate(p, grip(p, x))
+    fading = math.sqrt(p.motor_constant * current / (p.coil_reach * p.mass)) + abs(v) / p.coil_reach
     return braking + fading + math.sqrt(p.stiffness / p.mass)
 
 
-def is_slaved(p: Constants, s: ShotState) -> bool:
-    """Whether the current has come to follow the motion."""
-    if s.time < s.transient_until:
-        return False
-    return motion_rate(p, s) * p.inductance / p.resistance <= _SLAVED
+def has_fast_current(p: Constants, u: float, x: float, v: float, i: float) -> bool:
+    """Whether the current settles so fast that it follows the motion, once its transient is over."""
+    return motion_rate(p, u, x, v, i) * p.inductance / p.resistance <= _SLAVED
 
 
 def try_to_follow(p: Constants, s: ShotState, w: StepSeries) -> bool:
     """The series whose current follows the motion, if it does; if they do not settle, when to look again."""
-    if not is_slaved(p, s):
+    if s.time < s.transient_until or not has_fast_current(p, s.u, s.x, s.v, s.i):
         return False
     settled = expand_slaved(p, s.u, s.heading, s.guess, w)
     if not settled:
@@ -70,7 +68,7 @@ def begin_coil(p: Constants, s: ShotState) -> None:
     """A first guess at the step, when the current's transient will be over, and when to look whether it creeps."""
     s.creeping, s.creeping_from = False, s.time + until_next_look(p, 1.0)
     if p.inductance == 0.0:
-        s.guess = 2.0 / motion_rate(p, s)
+        s.guess = 2.0 / motion_rate(p, s.u, s.x, s.v, s.i)
         return
     rate = p.resistance / p.inductance
     swing = math.sqrt(p.back_emf * p.motor_constant / (p.mass * p.inductance))
@@ -124,11 +122,16 @@ def until_next_look(p: Constants, hold: float) -> float:
     return 1.0 / fading + _LOOK_AGAIN / settling_rate(p, hold) if fading > 0.0 else math.inf
 
 
+def may_creep(p: Constants, s: ShotState, hold: float) -> bool:
+    """Whether the position changes slowly enough, at the coil's hold, for speed and current to follow it."""
+    settling = settling_rate(p, hold)
+    return settling > 0.0 and creeping_rate(p, s, hold) <= _CREEPING * settling
+
+
 def try_to_creep(p: Constants, s: ShotState, w: StepSeries) -> None:
     """The series of a creeping magnet, if it creeps; if it does not yet, when to look again."""
     going, s.creeping, hold = s.creeping, False, grip(p, s.x)
-    settling = settling_rate(p, hold)
-    if settling > 0.0 and creeping_rate(p, s, hold) <= _CREEPING * settling:
+    if may_creep(p, s, hold):
         rate = creeping_rate(p, s, hold)
         s.creeping, w.x[0] = True, s.x
         span = expand_creeping(p, s, s.guess if going else 1.0 / (rate + 1.0 / HORIZON_S), w)
@@ -203,7 +206,7 @@ def finish_step(p: Constants, s: ShotState, w: StepSeries, span: float, event: i
     at = first_arrival(p, w, s.heading)
     if at <= used:
         used, event = at, COIL_EDGE if s.heading > 0.0 else STOP
-    if s.recoiling and s.heading > 0.0 and w.i[0] > 0.0 and w.i[0] + lower_bound(w.i, 1.0) <= 0.0:
+    if s.recoiling and s.heading > 0.0 and w.i[0] > 0.0 and least_sum(w.i, 1.0) <= 0.0:
         for n in range(ORDER + 1):
             w.other[n] = w.i[n]
         at = first_crossing(w)
@@ -220,8 +223,7 @@ def finish_step(p: Constants, s: ShotState, w: StepSeries, span: float, event: i
 def first_turn(w: StepSeries, heading: float) -> float:
     """Where the velocity first falls to 0, 2 if it does not. From rest v/s is looked at."""
     shift = 1 if w.v[0] == 0.0 else 0
-    begins = heading * w.v[shift]
-    if begins + lower_bound(w.v, heading) - min(shift * begins, 0.0) > 0.0:
+    if (least_sum_past_first(w.v, heading) if shift == 1 else least_sum(w.v, heading)) > 0.0:
         return 2.0
     for n in range(ORDER + 1 - shift):
         w.other[n] = heading * w.v[n + shift]
@@ -233,7 +235,7 @@ def first_turn(w: StepSeries, heading: float) -> float:
 def first_arrival(p: Constants, w: StepSeries, heading: float) -> float:
     """Where the magnet first meets the coil's edge (outwards) or the stop (homewards), 2 if it does not."""
     ahead = (p.coil_reach if heading > 0.0 else 0.0) - w.x[0]
-    if heading * ahead + lower_bound(w.x, -heading) > 0.0:
+    if heading * ahead + min(0.0, least_sum_past_first(w.x, -heading)) > 0.0:
         return 2.0
     for n in range(1, ORDER + 1):
         w.other[n] = -heading * w.x[n]

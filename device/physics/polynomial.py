@@ -13,6 +13,7 @@ from typing import Any
 
 from device.physics.equations import ORDER, Coefficients, StepSeries
 
+NO_DIGIT = 1e-17  # relative
 _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing
 
 
@@ -25,28 +26,17 @@ def value_at(c: Coefficients, s: float) -> float:
     return (even * q + odd * s) + c[0]
 
 
-def lower_bound(c: Coefficients, sign: float) -> float:
-    """A bound from below for what the polynomial, times `sign`, adds to its first coefficient on [0, 1]."""
-    even, odd = 0.0, 0.0
-    for j in range(1, ORDER, 2):
-        one, other = sign * c[j], sign * c[j + 1]
-        if not one >= 0.0:  # a number below 0, or none
-            even += one
-        if not other >= 0.0:
-            odd += other
-    return even + odd
-
-
 def _to_bernstein() -> list[str]:
     """b_j = sum over k <= j of C(j, k)/C(n, k) c_k."""
     return ["c = w.other", *(f"c{k} = c[{k}]" for k in range(ORDER + 1)), *_summed()]
 
 
-def _to_bernstein_over() -> list[str]:
+def _to_bernstein_over(*, shifted: bool) -> list[str]:
     """The same of the polynomial in (s - low)/width: shifted by Horner's scheme, then scaled."""
-    shifted = [f"c{k} += low * c{k + 1}" for first in range(ORDER) for k in range(ORDER - 1, first - 1, -1)]
+    places = [k for first in range(ORDER) for k in range(ORDER - 1, first - 1, -1)] if shifted else []
+    shifts = [f"c{k} += low * c{k + 1}" for k in places]
     scaled = [line for k in range(1, ORDER + 1) for line in (f"c{k} *= power", "power *= width")]
-    return ["c, power = w.other, width", *(f"c{k} = c[{k}]" for k in range(ORDER + 1)), *shifted, *scaled, *_summed()]
+    return ["c, power = w.other, width", *(f"c{k} = c[{k}]" for k in range(ORDER + 1)), *shifts, *scaled, *_summed()]
 
 
 def _summed() -> list[str]:
@@ -80,11 +70,34 @@ def _of_series(name: str, arguments: str, lines: list[str]) -> Any:
 to_bernstein: Callable[[StepSeries], None] = _of_series("to_bernstein", "w", _to_bernstein())
 """The Bernstein coefficients over [0, 1] of the polynomial in `other`."""
 to_bernstein_over: Callable[[StepSeries, float, float], None] = _of_series(
-    "to_bernstein_over", "w, low, width", _to_bernstein_over()
+    "to_bernstein_over", "w, low, width", _to_bernstein_over(shifted=True)
 )
 """The same over [low, low + width]."""
+to_bernstein_up_to: Callable[[StepSeries, float], None] = _of_series(
+    "to_bernstein_up_to", "w, width", _to_bernstein_over(shifted=False)
+)
+"""The same over [0, width]."""
 halve: Callable[[StepSeries], None] = _of_series("halve", "w", _halve())
 """Those over the first half of their interval in place of those over all of it; the second half's go `beyond`."""
+
+
+def _least_sum(name: str, first: int) -> Callable[[Coefficients, float], float]:
+    sums = [f"s{n} = {f's{n - 1} + ' if n > first else ''}sign * c[{n}]" for n in range(first, ORDER + 1)]
+    least = f"return min({', '.join(f's{n}' for n in range(first, ORDER + 1))})"
+    function: Callable[[Coefficients, float], float] = from_text(
+        name, "\n    ".join([f"def {name}(c, sign):", *sums, least])
+    )
+    return function
+
+
+least_sum = _least_sum("least_sum", 0)
+"""The least of the sums of the coefficients from the first to any of them, times `sign`.
+
+The polynomial, times `sign`, is nowhere in [0, 1] below it: summed by parts (Abel), it is a mean of these sums, whose
+weights are differences of powers of s.
+"""
+least_sum_past_first = _least_sum("least_sum_past_first", 1)
+"""The same without the first coefficient, for the rest of the polynomial divided by s."""
 
 
 def _value_at_end() -> Callable[[Coefficients], float]:
@@ -103,8 +116,10 @@ value_at_end = _value_at_end()
 def bernstein_over(w: StepSeries, low: float, high: float) -> None:
     """The Bernstein coefficients over [low, high] of the polynomial in `other`."""
     w.work += 1
-    if low > 0.0 or high < 1.0:
+    if low > 0.0:
         to_bernstein_over(w, low, high - low)
+    elif high < 1.0:
+        to_bernstein_up_to(w, high)
     else:
         to_bernstein(w)
 
@@ -125,11 +140,12 @@ def sign_changes(b: Coefficients) -> int:
 def bracketed_root(w: StepSeries, low: float, high: float) -> float:
     """The one root between `low` and `high` of the polynomial in `other`: Newton's method, kept inside by halving.
 
-    The polygon of the Bernstein coefficients over the bracket crosses 0 near the root.
+    The polygon of the Bernstein coefficients over the bracket crosses 0 near the root. Each step soon is a constant
+    times the square of the one before it; the next one is not made if it would move no digit.
     """
     c, b = w.other, w.bernstein
     sign = 1.0 if b[0] > 0.0 or (b[0] == 0.0 and b[ORDER] < 0.0) else -1.0
-    s = low + (high - low) * polygon_root(b)
+    s, before = low + (high - low) * polygon_root(b), 0.0
     for _ in range(80):
         q, even, odd, even_slope, odd_slope = s * s, c[ORDER], c[ORDER - 1], 0.0, 0.0
         for j in range(ORDER - 2, 0, -2):
@@ -147,12 +163,13 @@ def bracketed_root(w: StepSeries, low: float, high: float) -> float:
         else:
             high = s
         step = y / slope if slope != 0.0 else math.inf
-        nearer = s - step
+        nearer, by = s - step, abs(step)
         if not low < nearer < high:
-            nearer = 0.5 * (low + high)
-        if abs(nearer - s) <= 2.3e-16 * s or nearer in (low, high):
+            nearer, by, before = 0.5 * (low + high), 0.0, 0.0
+        settled = by * by * by <= NO_DIGIT * s * before * before and before > 0.0
+        if settled or abs(nearer - s) <= 2.3e-16 * s or nearer in (low, high):
             return nearer
-        s = nearer
+        s, before = nearer, by
     return s
 
 

@@ -241,12 +241,12 @@ def free_arc(p: Constants, s: ShotState) -> int:
     x, v, heading, left = s.x, s.v, s.heading, s.drive_until - s.time
     omega = math.sqrt(p.stiffness / p.mass)
     a = (friction(p, heading) - spring_force(p, x)) / p.mass
-    t, event = turn_time(omega, v, a, heading), TURN
+    t, event = math.inf, TURN
     if heading < 0.0:
         target = p.coil_reach if s.live else 0.0
-        fall = fall_time(omega, v, a, target - x)
-        if fall < math.inf:
-            t, event = fall, COIL_EDGE if s.live else STOP
+        t, event = fall_time(omega, v, a, target - x), COIL_EDGE if s.live else STOP
+    if not t < math.inf:
+        t, event = turn_time(omega, v, a, heading), TURN
     if not t < left:
         t, event = left, DRIVE_CHANGE
     s.time = s.drive_until if event == DRIVE_CHANGE else s.time + t

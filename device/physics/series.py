@@ -134,9 +134,9 @@ pass_of_both = _pass_of_both()
 
 TOLERANCE = 2e-12
 """Of the first coefficient left out, relative to the largest of the leading ones."""
-_LONGEST = 3.0  # how far past its scale a series may reach
-_NEAR = 0.02  # a span this near is as good: it multiplies what is left out by at most 1.02^24
-_NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
+LONGEST = 3.0  # how far past its scale a series may reach
+NEAR = 0.02  # a span this near is as good: it multiplies what is left out by at most 1.02^24
+NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
 _PASSES = 16  # the n-th adds about n! (L/R or the like, over the motion's own time)^n
 _SETTLED = 4e-16  # relative
 
@@ -218,9 +218,20 @@ def radius(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
     x_size = leading(w.x, v_size * span)
     i_size = leading(w.i, 1e-2 * (abs(s.u) + p.back_emf * abs(w.v[0])) / p.resistance)
     last = max(size_ratio(last_of(w.x), x_size), size_ratio(last_of(w.v), v_size), size_ratio(last_of(w.i), i_size))
-    if last <= _NEGLIGIBLE:
-        return _LONGEST
-    return min(_LONGEST, (TOLERANCE / last) ** (1.0 / ORDER)) if last < math.inf else 0.0
+    if last <= NEGLIGIBLE:
+        return LONGEST
+    return min(LONGEST, twenty_fourth_root(TOLERANCE / last)) if last < math.inf else 0.0
+
+
+def twenty_fourth_root(y: float) -> float:
+    """y**(1/24), right to 1.1 % between 0.4 and 3; less is at least 0.2, more at most 5.
+
+    Three square roots, then one step of Halley's method for the third root: what processors do in all lanes at once.
+    """
+    eighth = math.sqrt(math.sqrt(math.sqrt(y)))
+    third = (0.4 + eighth) / (1.0 + 0.4 * eighth)
+    cube = third * third * third
+    return third * (cube + 2.0 * eighth) / (2.0 * cube + eighth)
 
 
 def last_of(c: Coefficients) -> float:
@@ -254,11 +265,11 @@ def rescale(w: StepSeries, factor: float) -> None:
 
 def fitted_span(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
     """The span over which the series hold to the tolerance; they are rescaled to it. 0 if there is none."""
-    for _ in range(8):
+    for _ in range(40):
         factor = radius(p, s, span, w)
         if factor <= 0.0:
             return 0.0
-        if abs(factor - 1.0) <= _NEAR:
+        if abs(factor - 1.0) <= NEAR:
             break
         rescale(w, factor)
         span *= factor

@@ -53,30 +53,32 @@ from device.physics.polynomial import (
     bernstein_over,
     bracketed_root,
     halve,
-    lower_bound,
+    least_sum,
     next_piece,
     sign_changes,
     value_at,
 )
 from device.physics.segments import advance, enter, pulse_off, pulse_on
 
-_EQUAL = 1e-14  # relative: forces closer than this are one
+EQUAL = 1e-14  # relative: forces closer than this are one
 _NARROWEST = 1e-6  # of a step: no two peaks of the force lie closer
 
 
 def shoot(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None:
     """One shot from rest into `out`."""
-    s.x, s.v, s.i, s.until, s.farthest = 0.0, 0.0, 0.0, HORIZON_S, FARTHEST
+    rest_at_stop(s)
     shoot_on(p, s, w, out)
+
+
+def rest_at_stop(s: ShotState) -> None:
+    """The state before the first shot."""
+    s.x, s.v, s.i, s.until, s.farthest = 0.0, 0.0, 0.0, HORIZON_S, FARTHEST
 
 
 def shoot_on(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None:
     """One shot into `out`, from the motion and current in `s` to the end that `s` gives it, where it leaves `s`."""
-    forget(out)
     w.work = 0
-    out.max_displacement_m, s.heading = s.x, 0.0
-    pulse_on(p, s)
-    enter(p, s, BREAK_AWAY)
+    begin(p, s, out)
     event = GIVEN_UP
     for _ in range(MAX_SEGMENTS):
         event = advance(p, s, w)
@@ -85,12 +87,27 @@ def shoot_on(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None
         if p.model == BALLISTIC and out.stage == OVER:
             event = coast(p, s, out)
             break
-        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until) or w.work > MAX_WORK:
+        if w.work > MAX_WORK or not goes_on(p, s, event):
             break
-        if event == DRIVE_CHANGE:
-            pulse_off(p, s)
-        enter(p, s, event)
     conclude(p, s, event, out)
+
+
+def begin(p: Constants, s: ShotState, out: ShotResult) -> None:
+    """The first segment of a shot."""
+    forget(out)
+    out.max_displacement_m, s.heading = s.x, 0.0
+    pulse_on(p, s)
+    enter(p, s, BREAK_AWAY)
+
+
+def goes_on(p: Constants, s: ShotState, event: int) -> bool:
+    """Whether a segment follows on the event, which `s` then is at the beginning of."""
+    if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until):
+        return False
+    if event == DRIVE_CHANGE:
+        pulse_off(p, s)
+    enter(p, s, event)
+    return True
 
 
 def forget(out: ShotResult) -> None:
@@ -104,26 +121,31 @@ def forget(out: ShotResult) -> None:
 
 def note(p: Constants, s: ShotState, w: StepSeries, event: int, out: ShotResult) -> None:
     """What a segment adds to the results."""
+    if s.kind == COIL and out.stage != OVER and event != GIVEN_UP and (s.heading > 0.0 or s.u > 0.0):
+        note_peak(p, s, w, out)
+    note_end(p, s, event, out)
+
+
+def note_peak(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None:
+    """The recoil stage's peak. A pulse that meets the magnet on its way home is part of it."""
+    start = out.peak_force_N if out.stage == RECOILING else force_on_hand(p, s.heading, w.x[0], w.i[0])
+    out.stage = RECOILING
+    out.peak_force_N = peak_force(p, s, w, max(start, force_on_hand(p, s.heading, s.x, s.i)))
+
+
+def note_end(p: Constants, s: ShotState, event: int, out: ShotResult) -> None:
+    """What the end of a segment adds: how far the magnet is, the recoil stage's end, the turn, the landing."""
     out.max_displacement_m = max(out.max_displacement_m, s.x)
-    if out.stage != OVER and s.heading != 0.0:
-        note_recoil(p, s, w, event, out)
+    if out.stage != OVER and s.heading > 0.0:
+        cut = event == DRIVE_CHANGE and (p.opens or p.inductance == 0.0) and s.drive_until != s.until
+        if cut or event in (COIL_EDGE, FORCE_ZERO, TURN):
+            out.stage, out.recoil_end_s, out.recoil_impulse_Ns = OVER, s.time, p.mass * s.v
     if event == TURN and s.heading > 0.0 and math.isnan(out.firing_end_s):
         out.firing_end_s = s.time
     elif event == STOP:
         out.last_landing_s, out.last_impact_m_s = s.time, s.v
         if s.time >= p.pulse_s and math.isnan(out.reset_end_s):
             out.reset_end_s, out.impact_speed_m_s = s.time, -s.v
-
-
-def note_recoil(p: Constants, s: ShotState, w: StepSeries, event: int, out: ShotResult) -> None:
-    """The recoil stage's peak, and its end. A pulse that meets the magnet on its way home is part of it."""
-    if s.kind == COIL and event != GIVEN_UP and (s.heading > 0.0 or s.u > 0.0):
-        start = out.peak_force_N if out.stage == RECOILING else force_on_hand(p, s.heading, w.x[0], w.i[0])
-        out.stage = RECOILING
-        out.peak_force_N = peak_force(p, s, w, max(start, force_on_hand(p, s.heading, s.x, s.i)))
-    cut = event == DRIVE_CHANGE and (p.opens or p.inductance == 0.0) and s.drive_until != s.until
-    if s.heading > 0.0 and (cut or event in (COIL_EDGE, FORCE_ZERO, TURN)):
-        out.stage, out.recoil_end_s, out.recoil_impulse_Ns = OVER, s.time, p.mass * s.v
 
 
 def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
@@ -133,7 +155,7 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
     for n in range(ORDER - 1):
         w.other[n] = (n + 1) * (n + 2) * w.v[n + 2]
     w.other[ORDER - 1], w.other[ORDER] = 0.0, 0.0
-    if abs(w.other[0]) + lower_bound(w.other, math.copysign(1.0, w.other[0])) > 0.0:
+    if least_sum(w.other, math.copysign(1.0, w.other[0])) > 0.0:
         return best  # the force only rises or only falls
     low, width, halved, used = 0.0, s.used, False, s.used
     bernstein_over(w, low, used)
@@ -153,21 +175,11 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
 
 
 def rises_above(p: Constants, s: ShotState, w: StepSeries, best: float) -> bool:
-    """Whether the force may rise above `best` within the step, by two bounds of its series, m (n + 1) v[n + 1]/span."""
-    high, least = w.v[1], (best + _EQUAL * abs(best)) * s.span / p.mass
-    for n in range(2, ORDER + 1):
-        if w.v[n] > 0.0:
-            high += n * w.v[n]
-    if not high > least:
-        return False
+    """Whether the force may rise above `best` within the step, by its series, m (n + 1) v[n + 1]/span."""
     for n in range(ORDER):
         w.other[n] = (n + 1) * w.v[n + 1]
     w.other[ORDER] = 0.0
-    bernstein_over(w, 0.0, s.used)
-    for n in range(ORDER + 1):  # noqa: SIM110 - the compiler knows no generators
-        if w.bernstein[n] > least:
-            return True
-    return False
+    return -least_sum(w.other, -1.0) > (best + EQUAL * abs(best)) * s.span / p.mass
 
 
 def coast(p: Constants, s: ShotState, out: ShotResult) -> int:
