@@ -1,4 +1,4 @@
-"""Shots in machine code (extra `fast`), many at once or one: the one module that knows the compiler.
+"""Shots in machine code (extra `fast`), many at once or one.
 
 The first use compiles for half a minute and keeps the result beside this file, or in the user's cache; later
 processes load it in about a second. No session calls this.
@@ -11,9 +11,10 @@ import struct
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from operator import attrgetter
+from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any, cast, get_type_hints
 
@@ -23,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from device.parameters import ABOVE_ZERO, GunParameters
 from device.physics.equations import (
     CLOSED_FORM,
+    FULL,
     INVALID,
     NO_INDUCTANCE,
     ORDER,
@@ -34,7 +36,7 @@ from device.physics.equations import (
     model_number,
     pack,
 )
-from device.physics.shot import ShotSummary, interpret, shoot, summary_from
+from device.physics.shot import ShotSummary, interpret, summary_from
 from device.words import RecoilError
 
 Records = NDArray[Any]
@@ -53,13 +55,6 @@ _GUN_BYTES, _RESULT_BYTES = (
     struct.Struct("@" + "".join(_LETTERS[hint] for hint in get_type_hints(kind).values()))
     for kind in (Constants, ShotResult)
 )
-
-
-def _shoot_each(guns: Records, results: Records) -> None:
-    """The result of each gun's shot."""
-    state, series = np.empty(1, _STATE), np.empty(1, _SERIES)
-    for n in range(len(guns)):
-        shoot(guns[n], state[0], series[0], results[n])
 
 
 Functions = dict[FunctionType, Mapping[str, FunctionType]]
@@ -81,28 +76,46 @@ _ONCE = frozenset(["shoot", "shoot_on", "advance", "coil_step"])
 made, and made fast, of all that code at each of these levels: half of the compiler's time."""
 _SELDOM = frozenset(
     [
+        "after_event",
+        "begin",
         "bernstein_over",
-        "halve",
-        "first_crossing",
-        "peak_force",
+        "conclude",
+        "enter_lane",
         "expand_creeping",
         "expand_slaved",
+        "first_crossing",
+        "first_crossings",
+        "free_arc",
+        "goes_on",
+        "halve",
+        "note_end",
         "pass_of_both",
         "pass_of_current",
+        "peak_force",
         "powered_arc",
+        "rest",
+        "roots_of",
+        "shoot_side_by_side",
+        "to_coil",
     ]
 )
 """Called seldom or from many places, and long: the compiler may leave them where they are."""
 
 
+MachineCode = Callable[..., None]
+"""`device.physics.lanes.shoot_each` of (guns, results, those to be shot alone, *room)."""
+
+
 @lru_cache(maxsize=1)
-def machine_code() -> Callable[[Records, Records], None]:
-    """`_shoot_each` in machine code. `RecoilError`: there is no compiler."""
+def machine_code() -> MachineCode:
+    """The shots of many guns in machine code. `RecoilError`: there is no compiler."""
     if find_spec("numba") is None:
         raise RecoilError('compiled shots need numba, which is not installed: install "recoil[fast]"')
     import numba  # noqa: PLC0415 - the compiler waits until it is asked for
 
-    each = cast("FunctionType", _shoot_each)
+    from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler
+
+    each = cast("FunctionType", shoot_each)
     functions = _callees_first(each)
     twins: dict[FunctionType, Any] = {}
     for function, called in functions.items():
@@ -124,7 +137,7 @@ def _digest(functions: Functions) -> str:
     for function in functions:
         values = (function.__globals__.get(name) for name in function.__code__.co_names)
         parts += [repr(value) for value in values if isinstance(value, int | float | tuple | np.dtype)]
-    parts.append(repr(_GUN) + repr(_RESULT))
+    parts += [repr(_GUN), repr(_RESULT), Path(__file__).with_name("vectors.py").read_text(encoding="utf-8")]
     return hashlib.sha256("".join(parts).encode()).hexdigest()[:16]
 
 
@@ -139,6 +152,7 @@ _CHUNK = 4096  # shots between two words of progress
 _FIELDS = dict(zip((one.name for one in fields(GunParameters)), Constants._fields, strict=False))
 _OPTIONS = {"drive_off": ("shorted", "open"), "emf": ("printed", "reciprocal")}  # false and true among the constants
 _result_values = attrgetter(*(one.name for one in fields(ShotResult)))
+_NOTHING = np.array(_result_values(ShotResult(status=INVALID)), _RESULT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,14 +201,15 @@ def simulate_batch(
     ['home', 'invalid', 'stuck']
     """
     guns, valid = _guns(gun or GunParameters(), fidelity, arrays)
-    results = np.zeros(len(guns), _RESULT)
-    among = results if valid.all() else np.empty(int(valid.sum()), _RESULT)
-    run = _interpret_each if interpreted or find_spec("numba") is None else machine_code()
-    _run(run, guns if valid.all() else guns[valid], among, cores, progress or (lambda _count: None))
-    if among is not results:
+    interprets = interpreted or find_spec("numba") is None
+    run = _interpret_each if interprets else partial(_shoot_compiled, machine_code())
+    results = np.full(int(valid.sum()), _NOTHING)
+    _run(run, guns if valid.all() else guns[valid], results, cores, progress or (lambda _count: None))
+    if not valid.all():
+        among, results = results, np.full(len(guns), _NOTHING)
         results[valid] = among
-    numbers = {name: np.where(valid, results[name], np.nan) for name in ShotBatch.__slots__[1:]}
-    return ShotBatch(status=np.where(valid, results["status"], INVALID).astype(np.int8), **numbers)
+    numbers = {name: results[name].copy() for name in ShotBatch.__slots__[1:]}
+    return ShotBatch(status=results["status"].astype(np.int8), **numbers)
 
 
 def compiled_simulator() -> Callable[..., ShotSummary]:
@@ -204,11 +219,12 @@ def compiled_simulator() -> Callable[..., ShotSummary]:
     """
     shoot_each, gun, result = machine_code(), bytearray(_GUN.itemsize), bytearray(_RESULT.itemsize)
     guns, results = np.frombuffer(gun, _GUN), np.frombuffer(result, _RESULT)
+    alone, room = np.ones(1, dtype=np.bool_), _room()
 
     def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
         """As `device.physics.simulate`."""
         _GUN_BYTES.pack_into(gun, 0, *pack(parameters, model_number(fidelity)))
-        shoot_each(guns, results)
+        shoot_each(guns, results, alone, *room)
         return summary_from(_RESULT_BYTES.unpack_from(result)[:_SUMMARY])
 
     return simulate
@@ -263,6 +279,21 @@ def _run(
     with ThreadPoolExecutor(cores) as pool:  # the compiled code holds no lock
         for count in pool.map(one, range(0, len(guns), _CHUNK)):
             progress(count)
+
+
+def _shoot_compiled(code: MachineCode, guns: Records, results: Records) -> None:
+    code(guns, results, (guns["model"] != FULL) | (guns["inductance"] == 0.0), *_room())
+
+
+def _room() -> tuple[NDArray[np.float64], Records, Records]:
+    """The lanes' rows, at a whole multiple of a register's bytes, a state for each lane, and series for one shot."""
+    from device.physics.lanes import ROWS  # noqa: PLC0415 - it is for the compiler
+    from device.physics.vectors import LANES  # noqa: PLC0415 - so is it
+
+    numbers = np.zeros((ROWS + 1) * LANES)
+    start = -numbers.ctypes.data // numbers.itemsize % LANES
+    rows = numbers[start : start + ROWS * LANES].reshape(ROWS, LANES)
+    return rows, np.empty(LANES, _STATE), np.empty(1, _SERIES)
 
 
 def _interpret_each(guns: Records, results: Records) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -53,10 +54,14 @@ def _entrants() -> Iterator[Contender]:
     )
 
 
+def numbers_of(guns: Sequence[GunParameters]) -> dict[str, Any]:
+    """Each parameter that is a number, as a column."""
+    names = [one.name for one in fields(GunParameters) if isinstance(getattr(guns[0], one.name), float)]
+    return {name: np.array([getattr(one, name) for one in guns]) for name in names}
+
+
 def _batch_of(shots: Shots) -> Ready:
-    gun, count = GunParameters(drive_off=shots.drive_off), len(shots.guns)
-    names = [one.name for one in fields(GunParameters) if isinstance(getattr(gun, one.name), float)]
-    each = {name: np.array([getattr(one, name) for one in shots.guns]) for name in names}
+    gun, count, each = GunParameters(drive_off=shots.drive_off), len(shots.guns), numbers_of(shots.guns)
     arrays = {name: np.tile(column, _COPIES) for name, column in each.items()}
 
     def found() -> list[Outputs]:
