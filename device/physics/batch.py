@@ -287,12 +287,12 @@ def _shoot_compiled(code: MachineCode, guns: Records, results: Records) -> None:
 
 def _room() -> tuple[NDArray[np.float64], Records, Records]:
     """The lanes' rows, at a whole multiple of a register's bytes, a state for each lane, and series for one shot."""
-    from device.physics.lanes import ROWS  # noqa: PLC0415 - it is for the compiler
+    from device.physics.lanes import LANE_ROWS  # noqa: PLC0415 - it is for the compiler
     from device.physics.vectors import LANES  # noqa: PLC0415 - so is it
 
-    numbers = np.zeros((ROWS + 1) * LANES)
+    numbers = np.zeros((LANE_ROWS + 1) * LANES)
     start = -numbers.ctypes.data // numbers.itemsize % LANES
-    rows = numbers[start : start + ROWS * LANES].reshape(ROWS, LANES)
+    rows = numbers[start : start + LANE_ROWS * LANES].reshape(LANE_ROWS, LANES)
     return rows, np.empty(LANES, _STATE), np.empty(1, _SERIES)
 
 

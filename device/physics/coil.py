@@ -65,8 +65,7 @@ def try_to_follow(p: Constants, s: ShotState, w: StepSeries) -> bool:
 
 
 def begin_coil(p: Constants, s: ShotState) -> None:
-    """A first guess at the step, when the current's transient will be over, and when to look whether it creeps."""
-    s.creeping, s.creeping_from = False, s.time + until_next_look(p, 1.0)
+    """A first guess at the step, and when the current's transient will be over."""
     if p.inductance == 0.0:
         s.guess = 2.0 / motion_rate(p, s.u, s.x, s.v, s.i)
         return
@@ -122,6 +121,11 @@ def until_next_look(p: Constants, hold: float) -> float:
     return 1.0 / fading + _LOOK_AGAIN / settling_rate(p, hold) if fading > 0.0 else math.inf
 
 
+def do_not_creep_yet(p: Constants, s: ShotState) -> None:
+    """A magnet that moves freely, and when to look whether it creeps."""
+    s.creeping, s.creeping_from = False, s.time + until_next_look(p, 1.0)
+
+
 def may_creep(p: Constants, s: ShotState, hold: float) -> bool:
     """Whether the position changes slowly enough, at the coil's hold, for speed and current to follow it."""
     settling = settling_rate(p, hold)
@@ -144,6 +148,7 @@ def try_to_creep(p: Constants, s: ShotState, w: StepSeries) -> None:
             s.creeping_from = s.time + until_next_look(p, hold)
     if going and not s.creeping:
         begin_coil(p, s)
+        do_not_creep_yet(p, s)
 
 
 def has_come_to_creep(p: Constants, s: ShotState, w: StepSeries, rate: float) -> bool:
@@ -176,6 +181,8 @@ def span_from_where_it_goes(p: Constants, s: ShotState, w: StepSeries, span: flo
 def coil_step(p: Constants, s: ShotState, w: StepSeries) -> int:
     """One step; `s` moves on to its end, the series over it stay in `w`, and how much of them was used in `s`."""
     left, u = s.drive_until - s.time, s.u
+    if s.time == s.began:
+        do_not_creep_yet(p, s)
     if s.creeping or s.time >= s.creeping_from:
         try_to_creep(p, s, w)
     if not s.creeping:

@@ -49,8 +49,8 @@ from device.physics.polynomial import (
 )
 from device.physics.segments import free_arc, rest
 from device.physics.series import (
-    LONGEST,
-    NEAR,
+    LONGEST_STEP,
+    NEAR_ENOUGH,
     NEGLIGIBLE,
     TOLERANCE,
     expand_printed,
@@ -60,20 +60,20 @@ from device.physics.series import (
     rescale,
     twenty_fourth_root,
 )
-from device.physics.shot import EQUAL, begin, conclude, goes_on, note_end, rest_at_stop, shoot
-from device.physics.vectors import LANES, alike, bits, rows_of, where
+from device.physics.shot import SAME_FORCE, begin, conclude, goes_on, note_end, rest_at_stop, shoot
+from device.physics.vectors import LANES, alike, bits, rows_in, where
 
 MOST_STEPS = 300.0
 """Of one shot in its lane; the paper's guns take 8 and 19."""
-FEWEST = 2 * LANES
+FEWEST_GUNS = 2 * LANES
 """Shots that are worth lanes."""
 
 # The rows: the gun's constants in the order of `Constants`, the state and the drive, the step, the results.
 TIME, X, V, I, GUESS, U, HEADING, UNTIL, RECOIL_MAY_END, FOLLOWS_FROM = range(16, 26)  # noqa: E741 - the current
-EVENT, SPAN, USED, STEPS, LEAVES, BUSY, STAGE, PEAK, TOP = range(26, 35)
+EVENT, SPAN, USED, STEP_COUNT, LEAVES, BUSY, STAGE, PEAK, TOP = range(26, 35)
 STATE_ROWS = 35
 SERIES_ROWS = ORDER + 1
-ROWS = STATE_ROWS + 5 * SERIES_ROWS
+LANE_ROWS = STATE_ROWS + 5 * SERIES_ROWS
 
 
 class LaneSeries(NamedTuple):
@@ -89,11 +89,11 @@ class LaneSeries(NamedTuple):
 def series_of(room: Any) -> LaneSeries:
     """The rows behind those of the state."""
     return LaneSeries(
-        rows_of(room[STATE_ROWS:]),
-        rows_of(room[STATE_ROWS + SERIES_ROWS :]),
-        rows_of(room[STATE_ROWS + 2 * SERIES_ROWS :]),
-        rows_of(room[STATE_ROWS + 3 * SERIES_ROWS :]),
-        rows_of(room[STATE_ROWS + 4 * SERIES_ROWS :]),
+        rows_in(room[STATE_ROWS:]),
+        rows_in(room[STATE_ROWS + SERIES_ROWS :]),
+        rows_in(room[STATE_ROWS + 2 * SERIES_ROWS :]),
+        rows_in(room[STATE_ROWS + 3 * SERIES_ROWS :]),
+        rows_in(room[STATE_ROWS + 4 * SERIES_ROWS :]),
     )
 
 
@@ -134,7 +134,7 @@ def radius_of(p: Any, u: Any, span: Any, w: Any) -> Any:
     x_size = leading(w.x, v_size * span)
     i_size = leading(w.i, 1e-2 * (abs(u) + p.back_emf * abs(w.v[0])) / p.resistance)
     last = max(ratio_of(last_of(w.x), x_size), ratio_of(last_of(w.v), v_size), ratio_of(last_of(w.i), i_size))
-    return where(last <= NEGLIGIBLE, LONGEST, min(LONGEST, twenty_fourth_root(TOLERANCE / last)))
+    return where(last <= NEGLIGIBLE, LONGEST_STEP, min(LONGEST_STEP, twenty_fourth_root(TOLERANCE / last)))
 
 
 def fit_spans(p: Any, r: Any, w: Any) -> None:
@@ -142,7 +142,7 @@ def fit_spans(p: Any, r: Any, w: Any) -> None:
     left = r[UNTIL] - r[TIME]
     factor = radius_of(p, r[U], r[GUESS], w)
     let_leave(r, ~(factor > 0.5))
-    factor = where(abs(factor - 1.0) <= NEAR, 1.0, factor)
+    factor = where(abs(factor - 1.0) <= NEAR_ENOUGH, 1.0, factor)
     rescale(w, factor)
     span = r[GUESS] * factor
     let_leave(r, ~((span > 0.0) & (span < math.inf)))
@@ -158,8 +158,8 @@ def fit_spans(p: Any, r: Any, w: Any) -> None:
 def step(r: Any, w: Any, reciprocal: bool) -> None:
     """`coil_step` in lanes, and what it adds to the results."""
     p = guns_of(r, reciprocal)
-    r[LEAVES] = where(r[STEPS] >= MOST_STEPS, 1.0, 0.0)
-    r[STEPS] = r[STEPS] + 1.0
+    r[LEAVES] = where(r[STEP_COUNT] >= MOST_STEPS, 1.0, 0.0)
+    r[STEP_COUNT] = r[STEP_COUNT] + 1.0
     settled = (r[BUSY] > 0.0) & (r[TIME] >= r[FOLLOWS_FROM])
     if bits(settled) != 0:
         let_leave(r, settled & has_fast_current(p, r[U], r[X], r[V], r[I]))
@@ -310,7 +310,7 @@ def find_peaks(p: Any, r: Any, w: Any) -> None:
     for n in range(ORDER):
         w.other[n] = (n + 1) * w.v[n + 1]
     w.other[ORDER] = 0.0
-    rises = pushed & (-least_sum(w.other, -1.0) > (best + EQUAL * abs(best)) * r[SPAN] / p.mass)
+    rises = pushed & (-least_sum(w.other, -1.0) > (best + SAME_FORCE * abs(best)) * r[SPAN] / p.mass)
     if bits(rises) == 0:
         return
     for n in range(ORDER - 1):
@@ -338,7 +338,7 @@ def put_gun(a: Any, lane: int, p: Constants) -> None:
     """The constants of a lane's next gun."""
     a[0, lane], a[1, lane], a[2, lane], a[3, lane] = p.mass, p.back_emf, p.resistance, p.inductance
     a[4, lane], a[5, lane], a[6, lane], a[7, lane] = p.motor_constant, p.coil_reach, p.stiffness, p.preload
-    a[8, lane], a[14, lane], a[STEPS, lane] = p.friction_out, p.friction_back, 0.0
+    a[8, lane], a[14, lane], a[STEP_COUNT, lane] = p.friction_out, p.friction_back, 0.0
 
 
 def put_state(a: Any, lane: int, s: Any, out: Any) -> None:
@@ -407,7 +407,7 @@ def refill(a: Any, gun_in: Any, taken: int, shots: Any, reciprocal: bool) -> int
     return taken
 
 
-def go_on(a: Any, gun_in: Any, ended: int, leave: int, shots: Any) -> None:
+def after_steps(a: Any, gun_in: Any, ended: int, leave: int, shots: Any) -> None:
     """What follows in the lanes whose step ended in an event, or which their shot has to leave."""
     guns, results, alone, states = shots
     for lane in range(LANES):
@@ -421,7 +421,7 @@ def go_on(a: Any, gun_in: Any, ended: int, leave: int, shots: Any) -> None:
 
 def shoot_side_by_side(shots: Any, room: Any, reciprocal: bool) -> None:
     """The shots of the guns with this law of the back-EMF that are not marked as `alone`; who leaves is marked."""
-    a, r, w = room, rows_of(room), series_of(room)
+    a, r, w = room, rows_in(room), series_of(room)
     gun_in, taken, busy = np.zeros(LANES, np.int64), 0, 1
     for lane in range(LANES):
         a[BUSY, lane] = 0.0
@@ -430,12 +430,12 @@ def shoot_side_by_side(shots: Any, room: Any, reciprocal: bool) -> None:
         busy = bits(r[BUSY] > 0.0)
         step(r, w, reciprocal)
         leave = bits(r[LEAVES] > 0.0) & busy
-        go_on(a, gun_in, (leave | bits(r[EVENT] != float(CONTINUES))) & busy, leave, shots)
+        after_steps(a, gun_in, (leave | bits(r[EVENT] != float(CONTINUES))) & busy, leave, shots)
 
 
 def shoot_each(guns: Any, results: Any, alone: Any, room: Any, states: Any, series: Any) -> None:
     """The result of each gun's shot. Those that are not plain from the start are marked as `alone`."""
-    many, shots = len(guns) >= FEWEST, (guns, results, alone, states)
+    many, shots = len(guns) >= FEWEST_GUNS, (guns, results, alone, states)
     if many:
         shoot_side_by_side(shots, room, False)
         shoot_side_by_side(shots, room, True)

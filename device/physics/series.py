@@ -134,8 +134,8 @@ pass_of_both = _pass_of_both()
 
 TOLERANCE = 2e-12
 """Of the first coefficient left out, relative to the largest of the leading ones."""
-LONGEST = 3.0  # how far past its scale a series may reach
-NEAR = 0.02  # a span this near is as good: it multiplies what is left out by at most 1.02^24
+LONGEST_STEP = 3.0  # how far past its scale a series may reach
+NEAR_ENOUGH = 0.02  # a span this near is as good: it multiplies what is left out by at most 1.02^24
 NEGLIGIBLE = 1e-30  # a last coefficient as small as this ends no step
 _PASSES = 16  # the n-th adds about n! (L/R or the like, over the motion's own time)^n
 _SETTLED = 4e-16  # relative
@@ -219,8 +219,8 @@ def radius(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
     i_size = leading(w.i, 1e-2 * (abs(s.u) + p.back_emf * abs(w.v[0])) / p.resistance)
     last = max(size_ratio(last_of(w.x), x_size), size_ratio(last_of(w.v), v_size), size_ratio(last_of(w.i), i_size))
     if last <= NEGLIGIBLE:
-        return LONGEST
-    return min(LONGEST, twenty_fourth_root(TOLERANCE / last)) if last < math.inf else 0.0
+        return LONGEST_STEP
+    return min(LONGEST_STEP, twenty_fourth_root(TOLERANCE / last)) if last < math.inf else 0.0
 
 
 def twenty_fourth_root(y: float) -> float:
@@ -269,7 +269,7 @@ def fitted_span(p: Constants, s: ShotState, span: float, w: StepSeries) -> float
         factor = radius(p, s, span, w)
         if factor <= 0.0:
             return 0.0
-        if abs(factor - 1.0) <= NEAR:
+        if abs(factor - 1.0) <= NEAR_ENOUGH:
             break
         rescale(w, factor)
         span *= factor

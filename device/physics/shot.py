@@ -60,7 +60,7 @@ from device.physics.polynomial import (
 )
 from device.physics.segments import advance, enter, pulse_off, pulse_on
 
-EQUAL = 1e-14  # relative: forces closer than this are one
+SAME_FORCE = 1e-14  # relative: forces closer than this are one
 _NARROWEST = 1e-6  # of a step: no two peaks of the force lie closer
 
 
@@ -179,7 +179,7 @@ def rises_above(p: Constants, s: ShotState, w: StepSeries, best: float) -> bool:
     for n in range(ORDER):
         w.other[n] = (n + 1) * w.v[n + 1]
     w.other[ORDER] = 0.0
-    return -least_sum(w.other, -1.0) > (best + EQUAL * abs(best)) * s.span / p.mass
+    return -least_sum(w.other, -1.0) > (best + SAME_FORCE * abs(best)) * s.span / p.mass
 
 
 def coast(p: Constants, s: ShotState, out: ShotResult) -> int:

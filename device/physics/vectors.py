@@ -188,7 +188,7 @@ def _write(context: Any, builder: Any, _kinds: Any, values: Any) -> Any:
     return context.get_dummy_value()
 
 
-def _rows_of(_typing: Any, array: Any) -> Any:
+def _rows_in(_typing: Any, array: Any) -> Any:
     def build(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         found = context.make_array(kinds.args[0])(context, builder, values[0])
         return builder.bitcast(found.data, _FLOATS.as_pointer())
@@ -216,7 +216,7 @@ def _bits(_typing: Any, _chosen: Any) -> Any:
     return types.int64(mask), build
 
 
-rows_of: Any = intrinsic(_rows_of)
+rows_in: Any = intrinsic(_rows_in)
 """The rows of an array (n, LANES) of floats, whose first number is at a whole multiple of a register's bytes."""
 alike: Any = intrinsic(_alike)
 """A number in each lane."""
