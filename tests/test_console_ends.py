@@ -129,6 +129,18 @@ def test_results_that_cannot_be_written_again_in_their_place_are_written_to_anot
 # windows and signals
 
 
+def test_a_run_that_is_refused_when_its_window_is_open_says_why_and_q_closes_it(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with AtConsole([*run_words(quick_configs), "--sensor", "csv:nowhere"], tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.until(lambda look: look.ended and look.says("--sensor csv:nowhere: cannot be opened"))
+        screen.keys.press("q")
+        code, said = screen.end()
+    assert code == 2, said
+    assert not list(tmp_path.glob("results/**/*.jsonl"))
+
+
 def test_closing_the_window_asks_why_and_ends_nothing_by_itself(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

@@ -14,7 +14,7 @@ from experiments.live_run import LiveRun
 from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
-from experiments.screens.console.keys import Name, Typing
+from experiments.screens.console.keys import BY_NAME, Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
@@ -257,8 +257,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             widgets.set_mood(label, name)
 
     def _idle(self, name: Name) -> bool:
-        """Whether a command does nothing now."""
-        return self.controls is None or bool(self.controls.idle(name))
+        """Whether a command does nothing now; a run that never began has one alone, which closes its window."""
+        if self.controls is None:
+            return name != "stop" or self.ended is None
+        return bool(self.controls.idle(name))
 
     # fitting
 
@@ -302,11 +304,15 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
         """The command that a key is now."""
-        return None if self.controls is None else self.controls.command(key, ctrl=ctrl)
+        if self.controls is None:
+            return "stop" if key == BY_NAME["stop"].key and not self._idle("stop") else None
+        return self.controls.command(key, ctrl=ctrl)
 
     def down(self, name: Name, at_s: float) -> None:
         """The key of a command went down."""
-        if self.controls is not None:
+        if self.controls is None:
+            self.do(name, self.press())
+        else:
             self.controls.down(name, at_s)
         self._show_soon()
 
