@@ -42,6 +42,7 @@ from experiments.record.replay import RunPosition
 from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
+from experiments.session.remarks import Noted
 from experiments.session.steps import Answered, Describe, Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
@@ -191,6 +192,9 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             )
             desk = Desk(live=live, gun_name=gun_name(gun.identify()), stimuli=stimuli)
             screen.begin(live)
+            if not request.sensor and _was_measured(before):
+                screen.trouble(UNMEASURED)
+                live.remark(Noted(trial=None, text=UNMEASURED))
             settle = recorder.settle if recorder else None
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
 
@@ -222,6 +226,17 @@ def _open_sensor(
     again = request.setup.config.trial.repeat_undelivered
     noise = generator(plan.seed, "sensor", plan.participant_id)
     return open_recorder(request.sensor, request.gun, stimuli.methods, clock, again=again, random=noise)
+
+
+UNMEASURED = (
+    "A sensor measured this run until now, and none is named any more: from here on shots are not measured. If they "
+    "are to be, stop, and resume with --sensor."
+)
+
+
+def _was_measured(before: Contents | None) -> bool:
+    """Whether a sensor took part in a run before it broke off."""
+    return before is not None and any(record.kind == "measured" for record in before.records)
 
 
 def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:

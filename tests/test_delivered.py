@@ -30,7 +30,7 @@ from experiments.design.config import DesignConfig
 from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
 from experiments.record.journal import Contents, read_journal
-from experiments.run import Finished, RunRequest, run
+from experiments.run import UNMEASURED, Finished, RunRequest, run
 from experiments.screens.synthetic import synthetic_screen
 from experiments.watch.runs import RunSoFar
 from tests.at_controls import short_direction
@@ -265,6 +265,27 @@ def test_a_run_goes_on_when_its_sensor_is_silent_or_ends_which_is_said_once(tmp_
     ]
     assert set(notes) <= set(told)
     assert len(told) == len(notes) + 2  # a line for each shot without a peak
+
+
+@pytest.mark.parametrize(("sensor", "notes"), [("", [UNMEASURED]), ("simulated", [])])
+def test_a_run_that_was_measured_says_so_when_it_goes_on_without_its_sensor(
+    tmp_path: Path, sensor: str, notes: list[str]
+):
+    journal = run_with(tmp_path, "simulated").place.journal
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:20]))
+    told = list[str]()
+
+    def screen(*given: Any) -> Any:
+        made = synthetic_screen(*given)
+        made.trouble = told.append
+        return made
+
+    request = RunRequest(
+        setup=short_design(), participant_id="P01", results=tmp_path, sensor=sensor, seed=3, again="resume"
+    )
+    contents = read_journal(run(request, screen, VirtualClock()).place.journal)
+    assert contents.finished
+    assert [record.body["text"] for record in contents.records if "noted" in str(record.body)] == told == notes
 
 
 def test_shots_of_a_train_that_were_not_delivered_are_told_in_one_line(tmp_path, monkeypatch):
