@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -9,14 +12,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from device import GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
-from device.methods import paper_methods
+from device.methods import drive_of, paper_methods
 from device.plugin import door, guard
 from device.plugin.conformance import GUN_CHECKS, ConformanceRig, StillClock, broken, conformance, rig_at
 from device.plugin.guard import GuardedGun, PluginError
 from device.simulated import SimulatedGun
+from device.words import DIRECTIONS
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
@@ -26,7 +31,7 @@ from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session import events
 from experiments.session.states import EMERGENCY
 from tests.firmware import emulated
-from tests.gun_plugins import install, install_sound_card
+from tests.gun_plugins import ROOT, install, install_sound_card
 from tests.twins import a_shot, a_twin
 
 TRIALS = 8
@@ -71,6 +76,61 @@ def test_a_plug_in_keeps_it(sound_card):
 
         rig = rig_at(sound_card, trials=TRIALS, speed=10.0, break_it=pull_the_plug)
         assert broken(conformance(rig)) == []
+
+
+TAPE = """
+</usr/share/alsa/alsa.conf>
+pcm.tape {{ type file slave.pcm "null" file "{file}" format "raw" }}
+"""
+ON_TAPE = """
+import threading, time
+import numpy as np
+from device.methods import paper_methods
+from sound_card_gun import Card, SoundCardGun
+from tests.test_gun_plugins import each_shot
+
+card = Card("tape", time.monotonic)
+gun = SoundCardGun(card, paper_methods(), time.monotonic)
+gun.arm()
+for shot in each_shot():
+    gun.fire(shot)
+off = threading.Event()
+off.set()
+card.play(np.ones(480_000, np.float32), off)
+gun.close()
+"""
+"""Every shot on a card that writes down what it is given, then ten seconds that are called off."""
+
+
+def each_shot() -> list[Shot]:
+    """A shot of each method to each side."""
+    methods = paper_methods().items()
+    return [
+        Shot(method=name, direction=direction, drive=drive_of(method))
+        for name, method in methods
+        for direction in DIRECTIONS
+    ]
+
+
+@pytest.mark.skipif(not Path("/usr/share/alsa/alsa.conf").exists(), reason="needs ALSA's configuration")
+def test_a_sound_card_is_given_each_shot_whole_and_little_of_what_is_called_off(
+    tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through PortAudio, on a device of ALSA's that nobody hears and that writes a file."""
+    import sound_card_gun as example
+
+    pytest.importorskip("sounddevice", reason="needs the extra `gui`")
+    (tmp_path / "asound.conf").write_text(TAPE.format(file=tmp_path / "tape.raw"))
+    monkeypatch.setenv("ALSA_CONFIG_PATH", str(tmp_path / "asound.conf"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(example.__file__).parent), str(ROOT)]))
+    subprocess.run([sys.executable, "-c", ON_TAPE], check=True)
+    tape = np.fromfile(tmp_path / "tape.raw", np.float32)
+    for shot in each_shot():
+        wave = example.waveform(shot, paper_methods()[shot.method])
+        at = np.flatnonzero(tape)[0] - np.flatnonzero(wave)[0]
+        assert np.array_equal(tape[at : at + len(wave)], wave)
+        tape = tape[at + len(wave) :]
+    assert 0 < np.count_nonzero(tape) < 240_000
 
 
 # what is let in

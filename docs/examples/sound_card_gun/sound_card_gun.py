@@ -82,8 +82,8 @@ class Card:
 
     def play(self, samples: Samples, off: threading.Event) -> float:
         self._begun.clear()
-        self._ended.clear()
         self._left = samples
+        self._ended.clear()  # last: until there are samples, the card's thread says each time that they have ended
         if not self._begun.wait(BEGUN_S) or not self._stream.active:
             self._left = samples[:0]
             raise LinkError("the sound card takes no samples; is it still plugged in?")
