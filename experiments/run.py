@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 import shlex
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, closing, nullcontext
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from device import Gun, open_gun
+from device import DeviceError, Gun, open_gun
 from experiments.catalogues.catalogue import ENGLISH, Language, language
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
@@ -166,7 +166,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     before = _before(place, request, clock)
     if before is None:
         _refuse_excluded(place, registered)
-    with closing(_open_gun(request, stimuli, clock)) as gun:
+    with _open_gun(request, stimuli, clock) as gun:
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
         stimuli.work_out(plan.trials)
         told: GrowingHistory = []
@@ -208,11 +208,20 @@ def _refuse_excluded(place: Place, registered: Register) -> None:
         )
 
 
-def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Gun:
+@contextmanager
+def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Iterator[Gun]:
+    """The gun, closed at the end. A gun that cannot be closed does not hide why the run ended."""
     try:
-        return open_gun(request.gun, stimuli.methods, clock=clock.now)
+        gun = open_gun(request.gun, stimuli.methods, clock=clock.now)
     except ValueError as error:
         raise PlaceError(f"--gun {request.gun}: {error}") from error
+    try:
+        yield gun
+    except BaseException:
+        with suppress(DeviceError):
+            gun.close()
+        raise
+    gun.close()
 
 
 def _open_sensor(

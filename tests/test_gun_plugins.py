@@ -411,6 +411,18 @@ def test_a_run_is_carried_out_on_a_plug_in(tmp_path: Path, sound_card: str) -> N
     assert "sound-card:null" in finished.place.journal.read_text()
 
 
+def test_a_plug_in_that_hangs_in_a_shot_stops_the_run_which_says_to_switch_off_its_power(
+    tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sound_card_gun
+
+    monkeypatch.setattr(guard, "ANSWER_S", 0.3)
+    monkeypatch.setattr(sound_card_gun.Null, "play", lambda *_: threading.Event().wait())
+    request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
+    with pytest.raises(RunStopped, match=r"cannot be disarmed \(.* never answered fire.*\): switch off its power"):
+        runs.run(request, synthetic_screen, RealClock(50.0))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("heeds", [True, False], ids=["disarms", "plays-on"])
 def test_the_stop_key_in_mid_pulse_of_a_plug_in_is_its_last_shot_until_a_test_shot(
