@@ -44,6 +44,7 @@ from device.physics.polynomial import (
     least_sum_past_first,
     to_bernstein,
     to_bernstein_up_to,
+    value_and_slope,
     value_at,
     value_at_end,
 )
@@ -246,15 +247,7 @@ def roots_of(w: Any, high: Any, needed: Any) -> Any:
     s = high * polygon_roots(b)
     low, before, found = alike(0.0), alike(0.0), s
     for _ in range(80):
-        q, even, odd, even_slope, odd_slope = s * s, c[ORDER], c[ORDER - 1], alike(0.0), alike(0.0)
-        for j in range(ORDER - 2, 0, -2):
-            even_slope = even_slope * q + even
-            odd_slope = odd_slope * q + odd
-            even = even * q + c[j]
-            odd = odd * q + c[j - 1]
-        even_slope = even_slope * q + even
-        y = (even * q + odd * s) + c[0]
-        slope = odd + 2.0 * (s * even_slope + q * odd_slope)
+        y, slope = value_and_slope(c, s)
         above, there = y * sign > 0.0, y == 0.0
         low, high = where(above, s, low), where(above, high, s)
         step_s = y / slope

@@ -81,6 +81,19 @@ halve: Callable[[StepSeries], None] = _of_series("halve", "w", _halve())
 """Those over the first half of their interval in place of those over all of it; the second half's go `beyond`."""
 
 
+def value_and_slope(c: Coefficients, s: float) -> tuple[float, float]:
+    """The polynomial and its derivative at s, by the same scheme."""
+    q, even_slope, odd_slope = s * s, c[ORDER], c[ORDER - 1]
+    even, odd = even_slope * q + c[ORDER - 2], odd_slope * q + c[ORDER - 3]
+    for j in range(ORDER - 4, 0, -2):
+        even_slope = even_slope * q + even
+        odd_slope = odd_slope * q + odd
+        even = even * q + c[j]
+        odd = odd * q + c[j - 1]
+    even_slope = even_slope * q + even
+    return (even * q + odd * s) + c[0], odd + 2.0 * (s * even_slope + q * odd_slope)
+
+
 def _least_sum(name: str, first: int) -> Callable[[Coefficients, float], float]:
     sums = [f"s{n} = {f's{n - 1} + ' if n > first else ''}sign * c[{n}]" for n in range(first, ORDER + 1)]
     least = f"return min({', '.join(f's{n}' for n in range(first, ORDER + 1))})"
@@ -147,15 +160,7 @@ def bracketed_root(w: StepSeries, low: float, high: float) -> float:
     sign = 1.0 if b[0] > 0.0 or (b[0] == 0.0 and b[ORDER] < 0.0) else -1.0
     s, before = low + (high - low) * polygon_root(b), 0.0
     for _ in range(80):
-        q, even, odd, even_slope, odd_slope = s * s, c[ORDER], c[ORDER - 1], 0.0, 0.0
-        for j in range(ORDER - 2, 0, -2):
-            even_slope = even_slope * q + even
-            odd_slope = odd_slope * q + odd
-            even = even * q + c[j]
-            odd = odd * q + c[j - 1]
-        even_slope = even_slope * q + even
-        y = (even * q + odd * s) + c[0]
-        slope = odd + 2.0 * (s * even_slope + q * odd_slope)
+        y, slope = value_and_slope(c, s)
         if y == 0.0:
             return s
         if y * sign > 0.0:
