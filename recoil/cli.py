@@ -78,15 +78,19 @@ app.add_typer(export_commands, name="export")
 app.add_typer(predictions.app, name="fit", short_help="Fit a model to a paper's rates, to times or to answers.")
 
 
+_OF_LIBRARIES = {
+    "PYDANTIC_DISABLE_PLUGINS": "__all__",  # else it asks every installed package whether it is one
+    "OPENBLAS_NUM_THREADS": "1",  # arrays are small here: threads for them wait for work, which costs time
+}
+"""Read by libraries from the environment when they are imported; what is set there already stays."""
+
+
 def main() -> None:
     """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
-    gc.set_threshold(
-        200_000, 20, 50
-    )  # imports make much and drop little: at 700 a quarter of `check` went into looking
+    gc.set_threshold(1_000_000, 20, 50)  # a report's imports make 350,000 objects and drop none: not looked through
     forgive_streams()
-    os.environ.setdefault(
-        "PYDANTIC_DISABLE_PLUGINS", "__all__"
-    )  # else it asks every installed package whether it is one
+    for name, value in _OF_LIBRARIES.items():
+        os.environ.setdefault(name, value)
     os.umask(0o077)  # what is written here is about people: for its owner alone
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):  # not every system knows all three
