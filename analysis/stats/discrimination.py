@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -31,10 +32,6 @@ CHANCE: Mapping[Task, float] = {"two-interval": 1 / 2, "abx": 1 / 2, "oddity": 1
 MOST_D = 20.0
 """Beyond it, every task's share of right answers is 1 in floats."""
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(200)
-_Z = 4.5 * (_NODES + 1.0)  # the density is below 1e-18 beyond 9
-_AREA = 4.5 * _WEIGHTS * np.exp(-(_Z**2) / 2.0) / np.sqrt(2.0 * np.pi)
-
 
 def _two_interval(d: FloatArray) -> FloatArray:
     return np.asarray(scipy.special.ndtr(d / np.sqrt(2.0)))
@@ -46,8 +43,17 @@ def _abx(d: FloatArray) -> FloatArray:
 
 
 def _oddity(d: FloatArray) -> FloatArray:
-    shift, out = d[..., None] * np.sqrt(2.0 / 3.0), -_Z * np.sqrt(3.0)
-    return np.asarray(2.0 * ((scipy.special.ndtr(out + shift) + scipy.special.ndtr(out - shift)) @ _AREA))
+    z, area = _half_normal()
+    shift, out = d[..., None] * np.sqrt(2.0 / 3.0), -z * np.sqrt(3.0)
+    return np.asarray(2.0 * ((scipy.special.ndtr(out + shift) + scipy.special.ndtr(out - shift)) @ area))
+
+
+@cache
+def _half_normal() -> tuple[FloatArray, FloatArray]:
+    """Places z above 0 and the normal density's share at each: 200 nodes of Gauss and Legendre, made when needed."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    z = 4.5 * (nodes + 1.0)  # the density is below 1e-18 beyond 9
+    return z, 4.5 * weights * np.exp(-(z**2) / 2.0) / np.sqrt(2.0 * np.pi)
 
 
 _RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {

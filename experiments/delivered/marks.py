@@ -24,11 +24,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from statistics import NormalDist
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from device.physics.hand import Vector
 from experiments.session.remarks import DeliveryMark
+
+if TYPE_CHECKING:
+    from device.physics.hand import Vector
 
 FALSE_MARKS = 1e-4
 """Marks a shot while nothing is wrong, at the most."""
