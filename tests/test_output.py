@@ -346,6 +346,12 @@ def test_a_table_is_readable_at_any_width(columns: int, monkeypatch: pytest.Monk
         assert {word for cell in row for word in cell.split()} <= words | {word.rstrip(":") for word in words}
 
 
+def test_nothing_in_a_table_is_taken_for_a_picture() -> None:
+    text = with_tables(Section(title="", tables=(Table(caption="", header=("a :cat:",), rows=((":dog: [b]",),)),)))
+    assert "a :cat:" in text
+    assert ":dog: [b]" in text
+
+
 # messages
 
 

@@ -84,7 +84,8 @@ def with_tables(section: Section, *, ruled: bool = False, unfolded: int = 0) -> 
     from rich.console import Console
 
     text = io.StringIO()
-    console = Console(file=text, width=shutil.get_terminal_size((WIDTH, 24)).columns, highlight=False, markup=False)
+    width = shutil.get_terminal_size((WIDTH, 24)).columns
+    console = Console(file=text, width=width, highlight=False, markup=False, emoji=False)
     for table in section.tables:
         if not table.rows or _least_width(table) <= console.width:
             console.print(_drawn(table, ruled=ruled, unfolded=unfolded))

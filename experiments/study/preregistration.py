@@ -22,8 +22,6 @@ from experiments.clock import date_text
 from experiments.config.door import ConfigError, Model, StudyConfig, read_toml
 from experiments.config.setup import Setup, sha256
 from experiments.design.config import DesignConfig
-from experiments.record import journal
-from experiments.record.journal import JournalError
 
 STUDY_FILE = "study.toml"
 JOURNALS = "results/sub-*/sub-*_journal.jsonl"
@@ -378,10 +376,12 @@ def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[str]:
 
 def carried_by(paths: Iterable[Path]) -> Iterator[tuple[str, str]]:
     """The code and the hash that each journal names; who names none, or cannot be read, is left out."""
+    from experiments.record import journal  # noqa: PLC0415 - of use where there are journals alone
+
     for path in sorted(paths):
         try:
             head = journal.head(path)
-        except JournalError:
+        except journal.JournalError:
             continue
         if head is not None and head.preregistration_sha256:
             yield head.plan.participant_id, head.preregistration_sha256
