@@ -109,10 +109,10 @@ def _wide(long: pd.DataFrame, methods: Sequence[str]) -> pd.DataFrame:
     measures = [name for name in long.columns if name not in _KEYS]
     pairs = [(method, measure) for method in methods for measure in measures]
     names = short_names([f"{method}_{measure}" for method, measure in pairs])
-    by_method = {method: rows.set_index(_KEYS[:2]) for method, rows in long.groupby("method")}
     index = long.set_index(_KEYS[:2]).index.unique()
+    by_method = {method: rows.set_index(_KEYS[:2]).reindex(index) for method, rows in long.groupby("method")}
     made = {
-        name: by_method[method][measure].reindex(index)
+        name: by_method[method][measure]
         for name, (method, measure) in zip(names, pairs, strict=True)
         if method in by_method
     }
