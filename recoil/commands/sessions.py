@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
@@ -107,6 +108,7 @@ def run(
     from experiments.run import ParticipantOptions, RunRequest
     from recoil import session
 
+    gc.set_threshold(50_000, 5, 1000)  # of few objects at a time: milliseconds, also while a gun is armed
     request = RunRequest(
         setup=load_setup(config),
         participant_id=participant or "",
