@@ -20,7 +20,8 @@ from Xlib import X
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from recoil.config_files import new_study
 from tests import figure_files, warm_start, watched_start

@@ -8,11 +8,10 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from device import DeviceError, Gun, open_gun
-from experiments.catalogues.catalogue import ENGLISH, Language, language
+from experiments.catalogues.catalogue import ENGLISH, language
 from experiments.clock import Clock, date_text
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -20,7 +19,7 @@ from experiments.design.plan import Plan
 from experiments.design.planning import plan_of, practice_of
 from experiments.design.shown_texts import setup_in
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
-from experiments.design.streams import checked_seed, draw_seed, generator
+from experiments.design.streams import generator
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.rebuild import began_with, shots_table, table
@@ -30,7 +29,6 @@ from experiments.record.journal import (
     Contents,
     Journal,
     JournalError,
-    ParticipantKind,
     ShownLanguage,
     begun,
     hold_journal,
@@ -39,6 +37,7 @@ from experiments.record.journal import (
 from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
+from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
@@ -50,11 +49,6 @@ from experiments.study.register import Register
 
 if TYPE_CHECKING:
     from experiments.delivered.recorder import ShotRecorder
-
-Again = Literal["ask", "resume", "fresh"]
-"""What to do with an unfinished run: refuse and say what is there, go on with it, or set it aside."""
-ScreenName = Literal["terminal", "synthetic", "console"]
-"""Where a run is shown and worked."""
 
 
 class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wrong
@@ -71,68 +65,6 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParticipantOptions:
-    """What the participant has beside the console; `monitor` is the index of their screen, `None` for the last one."""
-
-    screen: bool = False
-    keys: bool = False
-    noise: bool = False
-    monitor: int | None = None
-
-    @property
-    def any(self) -> bool:
-        """Whether the participant's own process runs at all."""
-        return self.screen or self.keys or self.noise
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunRequest:
-    """Who does what, where, at which screen, with which gun and seed.
-
-    `sensor` is empty where nothing measures what is delivered; with `markers` what happens goes to Lab Streaming Layer
-    meanwhile. `seed` is `None` where the config or the system gives
-    it. A `practice` is not analysed: it has files of its own and can be done again; nothing of a `training` is kept.
-    `anew_reason` is why an unfinished run is set aside for a fresh one: for the register and the head of the new
-    journal. At the console the participant may have `options` of their own, and a `visual` run is worked by a
-    synthetic one. `language` is the participant's; `catalogues` is where else there are languages. Of a synthetic
-    participant's run, which can be made again, records may be `synced_at_end`.
-    """
-
-    setup: Setup[DesignConfig]
-    participant_id: str
-    results: Path
-    gun: str = "simulated"
-    sensor: str = ""
-    markers: bool = False
-    seed: int | None = None
-    again: Again = "ask"
-    anew_reason: str = ""
-    practice: bool = False
-    training: bool = False
-    screen: ScreenName = "synthetic"
-    visual: bool = False
-    options: ParticipantOptions = ParticipantOptions()
-    language: Language = ENGLISH
-    catalogues: Path | None = None
-    synced_at_end: bool = False
-
-    @property
-    def simulated(self) -> bool:
-        """Whether a synthetic participant answers."""
-        return self.screen == "synthetic" or self.visual
-
-    @property
-    def participant_kind(self) -> ParticipantKind:
-        """Who does the run, as the journal's head says it."""
-        return "synthetic" if self.simulated else "person"
-
-    @property
-    def each_synced(self) -> bool:
-        """Whether each record is on the disk before the next step: always where a person takes part."""
-        return not (self.synced_at_end and self.simulated)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
     """A finished run: its plan, where it lies, and how many answers were read back from the disk."""
 
@@ -142,14 +74,6 @@ class Finished:
 
 
 MakeScreen = Callable[[Setup[DesignConfig], Plan, Clock], Screen]
-
-
-def resolve_seed(request: RunRequest) -> int:
-    """The seed of a new run: asked for, else the config's, else drawn from the system."""
-    for seed in (request.seed, request.setup.config.seed):
-        if seed is not None:
-            return checked_seed(seed)
-    return draw_seed()
 
 
 def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:

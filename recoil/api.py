@@ -70,7 +70,8 @@ def run_synthetic(
     ['sub-P01_task-preference_ratings.csv']
     """
     from experiments.clock import VirtualClock
-    from experiments.run import RunRequest, run
+    from experiments.run import run
+    from experiments.run_request import RunRequest
     from experiments.screens.synthetic import synthetic_screen
     from recoil.arguments import argument_error, arguments_named, check_setup, path_of, texts_of
 

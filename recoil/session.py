@@ -20,7 +20,8 @@ from experiments.live_run import RunStopped, Screen
 from experiments.rebuild import rebuild, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
-from experiments.run import Again, Finished, ParticipantOptions, RunRequest, ScreenName, language_begun_in, run
+from experiments.run import Finished, language_begun_in, run
+from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered

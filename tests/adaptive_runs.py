@@ -24,7 +24,8 @@ from experiments.record import storage
 from experiments.record.journal import Contents, Journal, contents_of, read_journal
 from experiments.record.replay import RunPosition, replay
 from experiments.record.replay import history as told_by
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session import events

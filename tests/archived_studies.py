@@ -12,7 +12,8 @@ from experiments.config.setup import sha256
 from experiments.load import load_setup
 from experiments.rebuild import rebuild
 from experiments.record.journal import link_of, record_line
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import append, entry
 from recoil.config_files import new_study

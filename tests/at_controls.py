@@ -28,7 +28,8 @@ from experiments.rebuild import table
 from experiments.record import storage
 from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
-from experiments.run import Finished, RunRequest, run
+from experiments.run import Finished, run
+from experiments.run_request import RunRequest
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.keys import Name, Presses

@@ -24,7 +24,7 @@ from experiments.design.planning import plan_of
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record import storage
-from experiments.run import RunRequest
+from experiments.run_request import RunRequest
 from experiments.screens.console import progress, widgets
 from experiments.session.states import State
 from tests.at_controls import short_direction

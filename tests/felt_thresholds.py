@@ -16,7 +16,8 @@ from device.parameters import GunParameters
 from experiments.clock import VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.laws import SyntheticAnswers

@@ -18,7 +18,8 @@ from experiments.config.door import participant_codes
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.laws import RatesLaw, RatingsLaw, SyntheticAnswers
 

@@ -20,7 +20,7 @@ from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
-from experiments.run import RunRequest
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
 from experiments.study.folders import Place, place

@@ -21,7 +21,7 @@ from device import LinkError
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
-from experiments.run import RunRequest
+from experiments.run_request import RunRequest
 from experiments.screens.console import app
 from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events

@@ -20,7 +20,8 @@ from experiments.rebuild import table
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
 from experiments.record.replay import RunPosition
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.runner import Desk, carry_out
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.design_session import design_session

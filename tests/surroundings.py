@@ -6,7 +6,8 @@ from pathlib import Path
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from tests.log_files import trial_rows, trials_path, write_rows, write_study
 

@@ -16,7 +16,8 @@ from experiments.rebuild import table
 from experiments.record.design_table import design_rows
 from experiments.record.journal import Contents, Record, read_journal
 from experiments.record.replay import history as told_by
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import step_record
 from tests.adaptive_kills import killed_until_done, unbroken

@@ -15,7 +15,8 @@ from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import JournalError, read_journal
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError
 from recoil.config_files import copy_began_with

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from experiments.clock import VirtualClock
 from experiments.config.door import EligibilityConfig
 from experiments.record.journal import JournalError, hold_journal
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.enrolment import (

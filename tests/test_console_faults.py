@@ -15,7 +15,7 @@ import pytest
 from experiments import run as runs
 from experiments.record.journal import Contents, read_journal
 from experiments.record.replay import history
-from experiments.run import RunRequest
+from experiments.run_request import RunRequest
 from experiments.session.steps import Answered, Ask, Failed, Fired, FireShot
 from experiments.study.folders import place
 from tests.faulty_console import PATIENCE_S, SETUP, SLOW_SYNC_S, TRIALS, child

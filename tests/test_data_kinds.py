@@ -16,7 +16,8 @@ from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.record.tables import DataKind
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError, open_study, overview
 from recoil.config_files import new_study

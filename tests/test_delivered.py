@@ -30,7 +30,8 @@ from experiments.design.config import DesignConfig
 from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
 from experiments.record.journal import Contents, read_journal
-from experiments.run import UNMEASURED, Finished, RunRequest, run
+from experiments.run import UNMEASURED, Finished, run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.watch.runs import RunSoFar
 from tests.at_controls import short_direction

@@ -19,7 +19,8 @@ from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
 from experiments.clock import VirtualClock
 from experiments.load import load_setup, shipped_folder
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from tests.bids_validator import validated
 from tests.designs import ADAPTIVE, OF_THE_PAPER, SHIPPED, path_of

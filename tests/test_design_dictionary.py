@@ -7,7 +7,8 @@ import stat
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.record.design_columns import columns
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 
 

@@ -16,7 +16,8 @@ from experiments.rebuild import rebuild
 from experiments.record.design_columns import columns
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import FireShot, Inform, Prepare, Rest
 from experiments.study.folders import place

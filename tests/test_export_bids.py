@@ -19,7 +19,8 @@ from analysis.logs.reading import read_logs
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
 from experiments.record import tables
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError
 from experiments.study.register import append, entry

@@ -14,7 +14,8 @@ from experiments.config.door import ConfigError
 from experiments.design.planning import plan_of
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read_journal
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.laws import AppealLaw, DiffusionLaw, SyntheticAnswers
 from experiments.synthetic.model_based import ModelParameters

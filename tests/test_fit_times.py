@@ -17,7 +17,8 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.design.streams import generator
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import Recoil
 from tests.decisions import decide_all, made

@@ -21,7 +21,8 @@ from experiments.design.planning import plan_of, practice_of
 from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.console.progress import coming
 from experiments.screens.console.view import About, Seen, instruction
 from experiments.screens.synthetic import synthetic_screen

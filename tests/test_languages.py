@@ -42,7 +42,8 @@ from experiments.design.shown_texts import letters_of, setup_in, shown_texts, te
 from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.load import load_setup
 from experiments.record.journal import ShownLanguage, read_journal
-from experiments.run import RunRequest, gone_on_with, run
+from experiments.run import gone_on_with, run
+from experiments.run_request import RunRequest
 from experiments.screens import phrases as phrases_of_the_console
 from experiments.screens import texts
 from experiments.screens.participant import messages as wire

@@ -14,7 +14,8 @@ from analysis.summary.participation import PersonInExperiment
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from tests.conftest import Recoil, refused

@@ -41,7 +41,8 @@ from experiments.config.setup import GunConfig
 from experiments.load import load_setup, shipped_folder
 from experiments.record import storage
 from experiments.record.tables import guard
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from tests import figure_files
 from tests.conftest import RECOIL, Recoil

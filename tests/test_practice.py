@@ -9,7 +9,8 @@ from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
 from experiments.design.planning import practice_of
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError
 

@@ -25,7 +25,8 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.config.door import ConfigError
 from experiments.load import load_setup
 from experiments.record.journal import head
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.console.people import changed_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register

@@ -12,7 +12,8 @@ from device import open_gun
 from experiments import rebuild
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.run import RunRequest, UnfinishedRun, run
+from experiments.run import UnfinishedRun, run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.enrolment import exclude

@@ -19,7 +19,8 @@ from experiments.design.planning import plan_of
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.record.replay import go_on, history, replay
-from experiments.run import Again, RunRequest, run
+from experiments.run import run
+from experiments.run_request import Again, RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.design_session import design_session
 from experiments.session.states import EMERGENCY

@@ -13,7 +13,8 @@ from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import Journal, read_journal
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark

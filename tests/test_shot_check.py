@@ -14,7 +14,8 @@ from device.methods import drive_of
 from device.words import Effect
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.console import shot_check
 from experiments.screens.console.shot_check import ShotCheck, ShotProgress, report_text, state_text
 from experiments.screens.synthetic import synthetic_screen

@@ -16,7 +16,8 @@ import pytest
 
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from tests.conftest import RECOIL, Soak
 from tests.log_files import trials_path, write_many

@@ -25,7 +25,8 @@ from experiments.catalogues.catalogue import ENGLISH, language
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
-from experiments.run import ParticipantOptions, RunRequest, run
+from experiments.run import run
+from experiments.run_request import ParticipantOptions, RunRequest
 from experiments.screens.console import widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening

@@ -14,7 +14,8 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.register import append, entry
 from recoil.config_files import new_study

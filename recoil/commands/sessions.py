@@ -105,7 +105,7 @@ def run(
 ) -> None:
     """One run: a participant doing one experiment."""
     from experiments.load import load_setup
-    from experiments.run import ParticipantOptions, RunRequest
+    from experiments.run_request import ParticipantOptions, RunRequest
     from recoil import session
 
     gc.set_threshold(50_000, 5, 1000)  # of few objects at a time: milliseconds, also while a gun is armed

@@ -23,7 +23,8 @@ from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.record.journal import begun
 from experiments.record.provenance import git_commit, recoil_version
-from experiments.run import RunRequest, run
+from experiments.run import run
+from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import folders
 

@@ -20,7 +20,8 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.run import Finished, RunRequest, run
+from experiments.run import Finished, run
+from experiments.run_request import RunRequest
 from experiments.screens.console import view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.participant_link import ParticipantSide

@@ -12,7 +12,7 @@ from PyQt6.QtGui import QGuiApplication, QScreen
 
 from experiments.catalogues.catalogue import ENGLISH, Language
 from experiments.config.door import Fact, Handedness, Sex
-from experiments.run import ParticipantOptions
+from experiments.run_request import ParticipantOptions
 from experiments.screens.console import widgets
 from experiments.screens.console.people import cell_text, note_text
 from experiments.screens.console.widgets import LineEdit, ListBox, TextLines, TickBox

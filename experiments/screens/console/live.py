@@ -25,7 +25,8 @@ from experiments.design.shown_texts import setup_in
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.run import Again, Finished, RunRequest, UnfinishedRun, gone_on_with
+from experiments.run import Finished, UnfinishedRun, gone_on_with
+from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors

@@ -16,7 +16,7 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.shown_texts import letters_of
 from experiments.live_run import LiveRun
-from experiments.run import RunRequest
+from experiments.run_request import RunRequest
 from experiments.screens.console.keys import choices_at, shared_keys
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant import messages

@@ -12,7 +12,7 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.record.journal import JournalError
-from experiments.run import Again, RunRequest
+from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
