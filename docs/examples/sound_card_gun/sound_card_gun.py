@@ -69,7 +69,7 @@ class Card:
         import sounddevice  # not at the top: no card is looked for until one is opened
 
         self._clock, self._left, self._start_s = clock, np.zeros(0, np.float32), 0.0
-        self._begun, self._ended = threading.Event(), threading.Event()
+        self._begun, self._ended, self._lock = threading.Event(), threading.Event(), threading.Lock()
         try:
             device = int(name) if name.isdigit() else name or None
             self._stream = sounddevice.OutputStream(
@@ -82,29 +82,35 @@ class Card:
 
     def play(self, samples: Samples, off: threading.Event) -> float:
         self._begun.clear()
-        self._left = samples
-        self._ended.clear()  # last: until there are samples, the card's thread says each time that they have ended
+        with self._lock:  # the card's thread takes some and leaves the rest, which must not be the rest of others
+            self._left = samples
+            self._ended.clear()
         if not self._begun.wait(BEGUN_S) or not self._stream.active:
-            self._left = samples[:0]
+            self._silence()
             raise LinkError("the sound card takes no samples; is it still plugged in?")
         while not (self._ended.wait(0.001) or off.is_set()):
             pass
-        self._left = samples[:0]
+        self._silence()
         return self._start_s
 
     def close(self) -> None:
         self._stream.close()
 
+    def _silence(self) -> None:
+        with self._lock:
+            self._left = self._left[:0]
+
     def _more(self, out: Samples, count: int, time: object, _status: object) -> None:
         """The card's thread asks for samples; `time` says when they will be heard."""
-        now, self._left = self._left[:count], self._left[count:]
+        with self._lock:
+            now, self._left = self._left[:count], self._left[count:]
+            if not len(self._left):
+                self._ended.set()
         out[:] = 0.0
         out[: len(now), 0] = now
         if len(now) and not self._begun.is_set():
             self._start_s = self._clock() + time.outputBufferDacTime - time.currentTime  # type: ignore[attr-defined]
             self._begun.set()
-        if not len(self._left):
-            self._ended.set()
 
 
 class SoundCardGun:
