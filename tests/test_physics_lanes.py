@@ -100,3 +100,11 @@ def test_the_guns_of_fifty_digits_are_as_right_in_lanes_as_alone(drive_off):
     arrays = numbers_of(random_shots(drive_off).guns)
     gun = GunParameters(drive_off=drive_off)
     assert differences(simulate_batch(gun, **arrays), shot_alone(gun, arrays)).max() < 1e-12
+
+
+def test_a_series_that_leaves_the_range_of_floats_leaves_its_lane():
+    gun = GunParameters(resistance_ohm=1e-308, inductance_H=2.5e-312, voltage_V=1.8e-301, back_emf_V_s_m=0.0)
+    depths_m = {"contact_depth_m": np.full(16, 5e-4)}
+    found = simulate_batch(gun, **depths_m)
+    assert same_bits(found, shot_alone(gun, depths_m))
+    assert found.names().tolist() == ["not-home"] * 16

@@ -230,7 +230,8 @@ def finish_step(p: Constants, s: ShotState, w: StepSeries, span: float, event: i
 def first_turn(w: StepSeries, heading: float) -> float:
     """Where the velocity first falls to 0, 2 if it does not. From rest v/s is looked at."""
     shift = 1 if w.v[0] == 0.0 else 0
-    if (least_sum_past_first(w.v, heading) if shift == 1 else least_sum(w.v, heading)) > 0.0:
+    least = least_sum_past_first(w.v, heading)
+    if (least if shift == 1 else heading * w.v[0] + min(0.0, least)) > 0.0:
         return 2.0
     for n in range(ORDER + 1 - shift):
         w.other[n] = heading * w.v[n + shift]

@@ -39,6 +39,7 @@ from device.physics.equations import (
     spring_force,
 )
 from device.physics.polynomial import (
+    NEAR_ROOT,
     NO_DIGIT,
     least_sum,
     least_sum_past_first,
@@ -69,7 +70,8 @@ MOST_STEPS = 300.0
 FEWEST_GUNS = 2 * LANES
 """Shots that are worth lanes."""
 
-# The rows: the gun's constants in the order of `Constants`, the state and the drive, the step, the results.
+# The rows: of the gun's constants those that steps need, at their places in `Constants`; the state and the drive, the
+# step, the results.
 TIME, X, V, I, GUESS, U, HEADING, UNTIL, RECOIL_MAY_END, FOLLOWS_FROM = range(16, 26)  # noqa: E741 - the current
 EVENT, SPAN, USED, STEP_COUNT, LEAVES, BUSY, STAGE, PEAK, TOP = range(26, 35)
 STATE_ROWS = 35
@@ -124,18 +126,20 @@ def let_leave(r: Any, chosen: Any) -> None:
 
 
 def ratio_of(a: Any, b: Any) -> Any:
-    """`size_ratio` in lanes, but for what is not a number."""
+    """`size_ratio` in lanes; not a number where a series is none, which `radius_of` sees."""
     return where(a == 0.0, 0.0, abs(a) / b)
 
 
 def radius_of(p: Any, u: Any, span: Any, w: Any) -> Any:
-    """`radius` in lanes; not a number where a series is none."""
+    """`radius` in lanes; 0 where a series is none."""
     held = p.stiffness * (p.preload + abs(w.x[0])) + p.friction_out + p.motor_constant * abs(w.i[0])
     v_size = leading(w.v, 1e-6 * held / p.mass * span)
     x_size = leading(w.x, v_size * span)
     i_size = leading(w.i, 1e-2 * (abs(u) + p.back_emf * abs(w.v[0])) / p.resistance)
-    last = max(ratio_of(last_of(w.x), x_size), ratio_of(last_of(w.v), v_size), ratio_of(last_of(w.i), i_size))
-    return where(last <= NEGLIGIBLE, LONGEST_STEP, min(LONGEST_STEP, twenty_fourth_root(TOLERANCE / last)))
+    x, v, i = ratio_of(last_of(w.x), x_size), ratio_of(last_of(w.v), v_size), ratio_of(last_of(w.i), i_size)
+    last = max(x, v, i)
+    factor = where(last <= NEGLIGIBLE, LONGEST_STEP, min(LONGEST_STEP, twenty_fourth_root(TOLERANCE / last)))
+    return where(x + v + i < math.inf, factor, 0.0)
 
 
 def fit_spans(p: Any, r: Any, w: Any) -> None:
@@ -254,7 +258,7 @@ def roots_of(w: Any, high: Any, needed: Any) -> Any:
         inside = (low < s - step_s) & (s - step_s < high)
         nearer = where(inside, s - step_s, 0.5 * (low + high))
         by, before = where(inside, abs(step_s), 0.0), where(inside, before, 0.0)
-        settled = (by * by * by <= NO_DIGIT * s * before * before) & (before > 0.0)
+        settled = (by * by * by <= NO_DIGIT * s * before * before) & (before > 0.0) & (by <= NEAR_ROOT * s)
         found = where(needed, where(there, s, nearer), found)
         ends = there | settled | (abs(nearer - s) <= 2.3e-16 * s) | (nearer == low) | (nearer == high)
         needed = needed & ~ends

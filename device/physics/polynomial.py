@@ -14,6 +14,7 @@ from typing import Any
 from device.physics.equations import ORDER, Coefficients, StepSeries
 
 NO_DIGIT = 1e-17  # relative
+NEAR_ROOT = 1e-7  # relative: steps that are larger are not trusted to say how far it is still
 _SMALLEST = 2.0**-46  # of the step: two roots closer than this are one touch, which ends nothing
 
 
@@ -171,7 +172,7 @@ def bracketed_root(w: StepSeries, low: float, high: float) -> float:
         nearer, by = s - step, abs(step)
         if not low < nearer < high:
             nearer, by, before = 0.5 * (low + high), 0.0, 0.0
-        settled = by * by * by <= NO_DIGIT * s * before * before and before > 0.0
+        settled = before > 0.0 and by <= NEAR_ROOT * s and by * by * by <= NO_DIGIT * s * before * before
         if settled or abs(nearer - s) <= 2.3e-16 * s or nearer in (low, high):
             return nearer
         s, before = nearer, by

@@ -224,7 +224,7 @@ def radius(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
 
 
 def twenty_fourth_root(y: float) -> float:
-    """y**(1/24), right to 1.1 % between 0.4 and 3; less is at least 0.2, more at most 5.
+    """y**(1/24), right to 1.1 % where it is between 0.4 and 3; less is at least 0.2, more at most 5.
 
     Three square roots, then one step of Halley's method for the third root: what processors do in all lanes at once.
     """
