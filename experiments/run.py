@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from device import DeviceError, Gun, open_gun
-from experiments.catalogues.catalogue import ENGLISH, language
+from experiments.catalogues.catalogue import ENGLISH, Language, language
 from experiments.clock import Clock, date_text
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
@@ -48,6 +49,8 @@ from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from experiments.delivered.recorder import ShotRecorder
 
 
@@ -62,6 +65,16 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
             "--resume goes on with it, --fresh sets it aside and starts anew"
         )
         self.where, self.contents = where, contents
+
+
+class GunNotClosed(DeviceError):  # noqa: N818 - what is left to be done
+    """A run is finished, and its gun could not be closed."""
+
+    def __init__(self, error: DeviceError) -> None:
+        super().__init__(
+            f"the run is finished and everything is saved, but the gun could not be closed ({error}): it may still be "
+            "armed; switch off its power"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +158,10 @@ def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Iterator[G
         with suppress(DeviceError):
             gun.close()
         raise
-    gun.close()
+    try:
+        gun.close()
+    except DeviceError as error:
+        raise GunNotClosed(error) from error
 
 
 def _open_sensor(
@@ -299,7 +315,15 @@ def gone_on_with(request: RunRequest) -> RunRequest:
     if request.again != "resume":
         return request
     began = language_begun_in(request)
-    return replace(request, language=ENGLISH if began is None else language(began.code, request.catalogues))
+    return replace(request, language=ENGLISH if began is None else begun_language(began.code, request.catalogues))
+
+
+def begun_language(code: str, folder: Path | None) -> Language:
+    """The language that a run began in. `ConfigError`, if its catalogue is not there any more."""
+    try:
+        return language(code, folder)
+    except ConfigError as error:
+        raise ConfigError(f"the run began in {code}, which it needs to go on (--catalogues DIR). {error}") from error
 
 
 def _open(place: Place, before: Contents | None, clock: Clock, *, each: bool) -> Journal:

@@ -20,7 +20,7 @@ from experiments.live_run import RunStopped, Screen
 from experiments.rebuild import rebuild, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
-from experiments.run import Finished, language_begun_in, run
+from experiments.run import Finished, begun_language, language_begun_in, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
@@ -128,9 +128,12 @@ def _language(request: RunRequest, wanted: LanguageOptions) -> Language:
     began = language_begun_in(request) if request.again == "resume" else None
     own = request.setup.config.language if began is None else began.code
     code = own if wanted.code is None else wanted.code
-    if began is not None and began.code == code and not began.checked_by:
-        return language(code, wanted.folder)
-    return wanted.language(code)
+    if began is None or began.code != code:
+        return wanted.language(code)
+    found = begun_language(code, wanted.folder)
+    if began.checked_by:
+        check_allowed(found, unchecked=wanted.unchecked)
+    return found
 
 
 def _check_terminal(request: RunRequest) -> None:

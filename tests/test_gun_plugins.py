@@ -412,6 +412,22 @@ def test_a_run_is_carried_out_on_a_plug_in(tmp_path: Path, sound_card: str) -> N
     assert "sound-card:null" in finished.place.journal.read_text()
 
 
+@pytest.mark.slow
+def test_a_plug_in_that_cannot_be_closed_leaves_a_finished_run_and_says_to_switch_off_its_power(
+    tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sound_card_gun
+
+    def jammed(_: object) -> None:
+        raise OSError("the card is jammed")
+
+    monkeypatch.setattr(sound_card_gun.SoundCardGun, "close", jammed)
+    request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
+    with pytest.raises(runs.GunNotClosed, match=r"run is finished .* \(.*card is jammed.*\): .* switch off its power"):
+        runs.run(request, synthetic_screen, RealClock(50.0))
+    assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).finished
+
+
 def test_a_plug_in_that_hangs_in_a_shot_stops_the_run_which_says_to_switch_off_its_power(
     tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -574,7 +574,9 @@ def test_at_the_console_a_run_is_gone_on_with_in_its_own_language_whatever_stand
     cut(carried_out(tmp_path / "own", language(LONG, folder)))
     own = replace(resuming(tmp_path / "own"), catalogues=folder)
     assert gone_on_with(own).language.messages == language(LONG, folder).messages
-    with pytest.raises(ConfigError, match="no catalogue of that name"):
+    with pytest.raises(
+        ConfigError, match=rf"the run began in {LONG}, .* \(--catalogues DIR\)\. .*no catalogue of that name"
+    ):
         gone_on_with(replace(own, catalogues=None))
     cut(carried_out(tmp_path / "english", ENGLISH))
     assert gone_on_with(replace(resuming(tmp_path / "english"), language=language("zh"))).language is ENGLISH
@@ -587,6 +589,8 @@ def resuming(results):
 def test_a_resumed_run_goes_on_in_its_own_language_without_being_told(tmp_path, folder):
     cut(carried_out(tmp_path, language(LONG, folder)))
     request = resuming(tmp_path)
+    with pytest.raises(ConfigError, match=rf"the run began in {LONG}, which it needs to go on \(--catalogues DIR\)"):
+        run_session(request)
     place = run_session(request, LanguageOptions(folder=folder))
     assert read_journal(place.journal).finished
     with pytest.raises(ConfigError, match="no catalogue of that name"):

@@ -314,6 +314,7 @@ def test_a_journal_under_another_name_and_what_is_no_journal_are_said(journal: P
     assert seen is not None
     assert [one.state for one in seen.rows] == ["damaged", "damaged"]
     assert "was it renamed?" in seen.rows[1].problem
+    assert "sub-P02_task-direction_journal.jsonl: is no file, though it is named like a journal" in seen.problem
     assert "<script>" not in page_parts(seen)[1]
 
 

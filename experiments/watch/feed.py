@@ -60,7 +60,7 @@ class MarkerFeed:
     def _journals(self) -> Iterator[tuple[Path, _Stamp]]:
         try:
             for entry in journals_in(self._folder):
-                if entry.name.endswith(ENDING):
+                if entry.name.endswith(ENDING) and entry.is_file():
                     now = Path(entry.path).stat()
                     yield Path(entry.path), (now.st_ino, now.st_size)
         except FileNotFoundError:  # not made yet, or moved away just now

@@ -53,7 +53,7 @@ class FolderWatch:
         self.folder = folder
         self._runs: dict[Path, WatchedRun] = {}
         self._unread: dict[Path, float] = {}
-        self._set_aside, self._problem = 0, ""
+        self._set_aside, self._problem, self._no_files = 0, "", ""
         self._asked_s = self._checked_s = self._told_s = -1e9
 
     def look(self) -> Watched | None:
@@ -90,16 +90,18 @@ class FolderWatch:
             rows=tuple(run.row(utc) for run in self.runs),
             set_aside=self._set_aside,
             unread=len(self._unread),
-            problem=self._problem,
+            problem=self._problem or self._no_files,
         )
 
     def _find(self) -> bool:
         """Know the journals that are there now; whether they are others than before."""
         before = self._there()
-        found, self._set_aside, self._problem = dict[Path, float](), 0, ""
+        found, self._set_aside, self._problem, self._no_files = dict[Path, float](), 0, "", ""
         try:
             for entry in journals_in(self.folder):
-                if entry.name.endswith(ENDING):
+                if not entry.is_file():
+                    self._no_files = f"{entry.path}: is no file, though it is named like a journal; it is left alone"
+                elif entry.name.endswith(ENDING):
                     found[Path(entry.path)] = entry.stat().st_mtime
                 else:
                     self._set_aside += 1
@@ -111,10 +113,10 @@ class FolderWatch:
             self._unread = {path: at_s for path, at_s in found.items() if path not in self._runs}
         return before != self._there()
 
-    def _there(self) -> tuple[int, str, int, int]:
+    def _there(self) -> tuple[int, str, str, int, int]:
         """What a look at the folder alone can change."""
         gone = sum(run.gone for run in self._runs.values())
-        return self._set_aside, self._problem, len(self._runs) + len(self._unread), gone
+        return self._set_aside, self._problem, self._no_files, len(self._runs) + len(self._unread), gone
 
     def _read_unread(self, until_s: float) -> bool:
         """Read journals for the first time, the youngest first; whether there were any."""
@@ -129,19 +131,15 @@ class FolderWatch:
 
 
 def journals_in(folder: Path) -> Iterator[os.DirEntry[str]]:
-    """The files that runs write their records to, those that were set aside too."""
+    """What is named as the files are that runs write their records to, those that were set aside too."""
     with os.scandir(folder) as people:
         for person in people:
             if person.name.startswith("sub-") and person.is_dir():
                 with os.scandir(person) as files:
-                    yield from (one for one in files if _is_journal(one))
+                    yield from (one for one in files if _STEM in one.name and one.name.endswith(".jsonl"))
 
 
 _STEM = ENDING.removesuffix(".jsonl")
-
-
-def _is_journal(entry: os.DirEntry[str]) -> bool:
-    return _STEM in entry.name and entry.name.endswith(".jsonl") and entry.is_file()
 
 
 class Reader:

@@ -29,9 +29,9 @@ def delivered_section(report: ReportData) -> Iterator[Section]:
     shots = sum(len(one.marks) for one in courses)
     bad, unknown = sum(one.undelivered for one in courses), sum(one.unmeasured for one in courses)
     said = (
-        f"A sensor on the gun measured {shots - unknown:,} of {shots:,} shots; {bad:,} of them were not delivered as "
-        "the model of their method says, and are marked. No trial is left out for that; a rule may do so (flag "
-        "not-delivered)."
+        f"Of {shots:,} shots that were fired while a sensor was on the gun, it measured {shots - unknown:,}; {bad:,} "
+        "of them were not delivered as the model of their method says, and are marked. No trial is left out for that; "
+        "a rule may do so (flag not-delivered)."
     )
     rows = tuple(tuple(_row(one)) for one in courses)
     table = Table(
