@@ -37,6 +37,7 @@ from device.physics.equations import (
 
 _SLACK = 1e-12  # relative: the magnet breaks away this far beyond the threshold, so that it does accelerate
 _SLACK_FLOOR_N = 1e-15  # the same for a gun with neither spring nor friction
+_HALF_SWING = 1e150  # tan(pi/2) for all that floats can tell, and small enough for its square
 
 
 def slack(p: Constants, x: float) -> float:
@@ -78,56 +79,81 @@ def homeward_threshold(p: Constants, x: float) -> float:
     return (spring_force(p, x) - p.friction_back - slack(p, x)) / (p.motor_constant * grip(p, x))
 
 
-def sine(omega: float, t: float) -> float:
-    """The integral of cos(wt): sin(wt)/w, or t without a spring."""
-    return math.sin(omega * t) / omega if omega > 0.0 else t
+def swing(omega: float, half: float) -> tuple[float, float, float]:
+    """cos(wt), sin(wt)/w and (1 - cos(wt))/w^2 by `half`, which is tan(wt/2)/w: 1, t and t^2/2 without a spring.
+
+    By the end of an arc as algebra gives it, without the sine of an arctangent.
+    """
+    root = omega * half
+    part = 1.0 / (1.0 + root * root)
+    sine = 2.0 * half * part
+    return (1.0 - root * root) * part, sine, half * sine
 
 
-def free_position(omega: float, x: float, v: float, a: float, t: float) -> float:
-    """The position, x + v sin(wt)/w + a (1 - cos wt)/w^2."""
-    half = sine(omega, 0.5 * t)
-    return x + v * sine(omega, t) + 2.0 * a * half * half
+def half_of(omega: float, t: float) -> float:
+    """tan(wt/2)/w, or t/2 without a spring, of t before the magnet turns: wt is at most pi."""
+    return math.tan(0.5 * omega * t) / omega if omega > 0.0 else 0.5 * t
 
 
-def free_velocity(omega: float, v: float, a: float, t: float) -> float:
-    """The velocity, v cos(wt) + a sin(wt)/w."""
-    return v * math.cos(omega * t) + a * sine(omega, t)
+def time_of(omega: float, half: float) -> float:
+    """The time by its `half`."""
+    return 2.0 * math.atan(omega * half) / omega if omega > 0.0 else 2.0 * half
 
 
-def turn_time(omega: float, v: float, a: float, heading: float) -> float:
-    """When the velocity v cos(wt) + a sin(wt)/w falls to 0; infinite if it never does."""
-    braking = -heading * a
-    if omega > 0.0:
-        return math.atan2(abs(v) * omega, braking) / omega
-    return abs(v) / braking if braking > 0.0 else math.inf
+def at_most(omega: float, half: float) -> float:
+    """A `half` whose square is no more than floats can express: half a swing, where it is infinite."""
+    return min(half, _HALF_SWING / omega) if omega > 0.0 else half
 
 
-def fall_time(omega: float, v: float, a: float, distance: float) -> float:
-    """When the magnet has moved by `distance` (at most 0); infinite if it turns before.
+def turn_half(omega: float, v: float, a: float, heading: float) -> float:
+    """When the velocity v cos(wt) + a sin(wt)/w falls to 0, as tan(wt/2)/w; infinite if it never does."""
+    speed, braking = abs(v), -heading * a
+    root = math.hypot(omega * speed, braking)
+    if braking > 0.0:
+        return speed / (root + braking)
+    if omega == 0.0:
+        return math.inf
+    return at_most(omega, (root - braking) / (omega * speed) / omega if omega * speed > 0.0 else math.inf)
 
-    The mean speed over an arc of harmonic motion gives tan(wt/2)/w = distance/(v + v_end).
+
+def fall_half(omega: float, v: float, a: float, distance: float) -> float:
+    """When the magnet has moved by `distance` (at most 0), as tan(wt/2)/w; infinite if it turns before.
+
+    It is distance/(v + v_end): the mean speed over an arc of harmonic motion.
     """
     v_squared = v * v + (2.0 * a - omega * omega * distance) * distance
     if distance == 0.0 or v_squared <= 0.0:
         return 0.0 if distance == 0.0 else math.inf
-    part = distance / (v - math.sqrt(v_squared))
-    return 2.0 * math.atan(omega * part) / omega if omega > 0.0 else 2.0 * part
+    return at_most(omega, distance / (v - math.sqrt(v_squared)))
 
 
-def free_current(p: Constants, u: float, i: float, v: float, a: float, t: float) -> float:
+def free_position(omega: float, half: float, x: float, v: float, a: float) -> float:
+    """The position, x + v sin(wt)/w + a (1 - cos wt)/w^2."""
+    _, sine, rise = swing(omega, half)
+    return x + v * sine + a * rise
+
+
+def free_velocity(omega: float, half: float, v: float, a: float) -> float:
+    """The velocity, v cos(wt) + a sin(wt)/w."""
+    cosine, sine, _ = swing(omega, half)
+    return v * cosine + a * sine
+
+
+def free_current(p: Constants, u: float, i: float, half: float, v: float, a: float, t: float) -> float:
     """The current of equation (3) under the free motion's back-EMF (none if reciprocal: the magnet is outside).
 
     i(t) = u/R + P cos(wt) + Q sin(wt)/w + (i_0 - u/R - P) exp(-rt), with r = R/L.
     """
     R, L = p.resistance, p.inductance
+    omega = math.sqrt(p.stiffness / p.mass)
     if L == 0.0:
-        return instant_current(p, u, p.coil_reach, free_velocity(math.sqrt(p.stiffness / p.mass), v, a, t))
-    omega, rate = math.sqrt(p.stiffness / p.mass), R / L
+        return instant_current(p, u, p.coil_reach, free_velocity(omega, half, v, a))
+    rate = R / L
     emf = 0.0 if p.reciprocal else p.back_emf
     coupling = emf / (R + L * omega * omega / rate)
-    cosine, sines = -coupling * (v - a / rate), -coupling * (a + omega * omega / rate * v)
-    fading = (i - u / R - cosine) * math.exp(-rate * t)
-    return u / R + cosine * math.cos(omega * t) + sines * sine(omega, t) + fading
+    first, second = -coupling * (v - a / rate), -coupling * (a + omega * omega / rate * v)
+    cosine, sine, _ = swing(omega, half)
+    return u / R + first * cosine + second * sine + (i - u / R - first) * math.exp(-rate * t)
 
 
 def pulse_on(p: Constants, s: ShotState) -> None:
@@ -223,15 +249,16 @@ def powered_arc(p: Constants, s: ShotState, w: StepSeries) -> int:
     w.x[0], w.i[0] = x, s.i
     omega = math.sqrt((p.stiffness + p.motor_constant * s.i / p.coil_reach) / p.mass)
     a = (motor_force(p, x, s.i) + friction(p, heading) - spring_force(p, x)) / p.mass
-    t, event = turn_time(omega, v, a, heading), TURN
+    half, event = turn_half(omega, v, a, heading), TURN
     way = (p.coil_reach if heading > 0.0 else 0.0) - x
-    arrival = fall_time(omega, -heading * v, -heading * a, -heading * way)
-    if arrival <= t:
-        t, event = arrival, COIL_EDGE if heading > 0.0 else STOP
+    arrival = fall_half(omega, -heading * v, -heading * a, -heading * way)
+    if arrival <= half:
+        half, event = arrival, COIL_EDGE if heading > 0.0 else STOP
+    t = time_of(omega, half)
     if not t < left:
-        t, event = left, DRIVE_CHANGE
+        t, half, event = left, half_of(omega, left), DRIVE_CHANGE
     s.time = s.drive_until if event == DRIVE_CHANGE else s.time + t
-    s.x, s.v = free_position(omega, x, v, a, t), free_velocity(omega, v, a, t)
+    s.x, s.v = free_position(omega, half, x, v, a), free_velocity(omega, half, v, a)
     s.span, s.used = t, 1.0
     return exact_arc(p, s, event)
 
@@ -241,18 +268,19 @@ def free_arc(p: Constants, s: ShotState) -> int:
     x, v, heading, left = s.x, s.v, s.heading, s.drive_until - s.time
     omega = math.sqrt(p.stiffness / p.mass)
     a = (friction(p, heading) - spring_force(p, x)) / p.mass
-    t, event = math.inf, TURN
+    half, event = math.inf, TURN
     if heading < 0.0:
         target = p.coil_reach if s.live else 0.0
-        t, event = fall_time(omega, v, a, target - x), COIL_EDGE if s.live else STOP
-    if not t < math.inf:
-        t, event = turn_time(omega, v, a, heading), TURN
+        half, event = fall_half(omega, v, a, target - x), COIL_EDGE if s.live else STOP
+    if not half < math.inf:
+        half, event = turn_half(omega, v, a, heading), TURN
+    t = time_of(omega, half)
     if not t < left:
-        t, event = left, DRIVE_CHANGE
+        t, half, event = left, half_of(omega, left), DRIVE_CHANGE
     s.time = s.drive_until if event == DRIVE_CHANGE else s.time + t
     if s.live:
-        s.i = free_current(p, s.u, s.i, v, a, t)
-    s.x, s.v = free_position(omega, x, v, a, t), free_velocity(omega, v, a, t)
+        s.i = free_current(p, s.u, s.i, half, v, a, t)
+    s.x, s.v = free_position(omega, half, x, v, a), free_velocity(omega, half, v, a)
     return exact_arc(p, s, event)
 
 

@@ -45,6 +45,7 @@ from device.physics.segments import (
     free_current,
     free_position,
     free_velocity,
+    half_of,
     pulse_off,
     pulse_on,
     resting_current,
@@ -92,8 +93,9 @@ class Segment:
             return x, 0.0, resting_current(self.constants, self.drive_V, i, t) if self.live else 0.0
         p = self.constants
         omega, a = math.sqrt(p.stiffness / p.mass), self.force(self.start) / p.mass
-        current = free_current(p, self.drive_V, i, v, a, t) if self.live else 0.0
-        return free_position(omega, x, v, a, t), free_velocity(omega, v, a, t), current
+        half = half_of(omega, t)
+        current = free_current(p, self.drive_V, i, half, v, a, t) if self.live else 0.0
+        return free_position(omega, half, x, v, a), free_velocity(omega, half, v, a), current
 
     def motor_force(self, state: tuple[float, float, float]) -> float:
         """The electromagnetic force F_m on the magnet in N (equation 2)."""
