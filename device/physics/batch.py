@@ -82,12 +82,16 @@ _SELDOM = frozenset(
         "conclude",
         "enter_lane",
         "expand_creeping",
+        "falling_crossing",
+        "falling_roots",
         "expand_slaved",
         "first_crossing",
         "first_crossings",
         "free_arc",
         "goes_on",
         "halve",
+        "newton_root",
+        "newton_roots",
         "note_end",
         "pass_of_both",
         "pass_of_current",
@@ -148,7 +152,7 @@ def _text(code: CodeType) -> str:
 
 
 _SUMMARY = len(fields(ShotSummary))  # so many of a result's numbers stand in a summary, in its order
-_CHUNK = 4096  # shots between two words of progress
+_PART = 4096  # shots between two words of progress
 _FIELDS = dict(zip((one.name for one in fields(GunParameters)), Constants._fields, strict=False))
 _OPTIONS = {"drive_off": ("shorted", "open"), "emf": ("printed", "reciprocal")}  # false and true among the constants
 _result_values = attrgetter(*(one.name for one in fields(ShotResult)))
@@ -200,16 +204,27 @@ def simulate_batch(
     >>> simulate_batch(friction_N=[0.21, -1.0, 1.70]).names().tolist()
     ['home', 'invalid', 'stuck']
     """
-    guns, valid = _guns(gun or GunParameters(), fidelity, arrays)
+    gun, model, columns = gun or GunParameters(), model_number(fidelity), _columns(arrays)
+    count = next((column.size for column in columns.values()), 1)
     interprets = interpreted or find_spec("numba") is None
-    run = _interpret_each if interprets else partial(_shoot_compiled, machine_code())
-    results = np.full(int(valid.sum()), _NOTHING)
-    _run(run, guns if valid.all() else guns[valid], results, cores, progress or (lambda _count: None))
-    if not valid.all():
-        among, results = results, np.full(len(guns), _NOTHING)
-        results[valid] = among
-    numbers = {name: results[name].copy() for name in ShotBatch.__slots__[1:]}
-    return ShotBatch(status=results["status"].astype(np.int8), **numbers)
+    shoot = _interpret_each if interprets else partial(_shoot_compiled, machine_code())
+    numbers = {name: np.empty(count) for name in ShotBatch.__slots__[1:]}
+    found = ShotBatch(status=np.empty(count, np.int8), **numbers)
+
+    def shoot_part(start: int) -> int:
+        part = slice(start, min(start + _PART, count))
+        guns, valid = _guns(gun, model, {name: column[part] for name, column in columns.items()}, part.stop - start)
+        results = _results(shoot, guns, valid)
+        for name in ShotBatch.__slots__:
+            getattr(found, name)[part] = results[name]
+        return len(guns)
+
+    with ThreadPoolExecutor(cores) as pool:  # the compiled code holds no lock
+        one_by_one = cores == 1 or count <= _PART  # a thread has nothing of the numbers in its core's own memory
+        for shots in (map if one_by_one else pool.map)(shoot_part, range(0, count, _PART)):
+            if progress is not None:
+                progress(shots)
+    return found
 
 
 def compiled_simulator() -> Callable[..., ShotSummary]:
@@ -230,20 +245,26 @@ def compiled_simulator() -> Callable[..., ShotSummary]:
     return simulate
 
 
-def _guns(gun: GunParameters, fidelity: str, arrays: Mapping[str, ArrayLike]) -> tuple[Records, NDArray[np.bool_]]:
-    """The constants of each gun, and which of them are guns."""
+def _columns(arrays: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
+    """The parameters in `arrays`, all of one length."""
     unknown = sorted(set(arrays) - set(_FIELDS))
     if unknown:
         raise ValueError(f"no such parameter: {', '.join(unknown)}; known are {', '.join(_FIELDS)}")
-    columns = [np.ravel(column) for column in np.broadcast_arrays(*map(np.asarray, arrays.values()))]
-    guns = np.repeat(np.array([tuple(pack(gun))], _GUN), columns[0].size if columns else 1)
-    valid = np.ones(len(guns), dtype=np.bool_)
-    for name, column in zip(arrays, columns, strict=True):
+    return dict(zip(arrays, map(np.ravel, np.broadcast_arrays(*map(np.asarray, arrays.values()))), strict=True))
+
+
+def _guns(
+    gun: GunParameters, model: int, columns: Mapping[str, NDArray[Any]], count: int
+) -> tuple[Records, NDArray[np.bool_]]:
+    """The constants of each gun, and which of them are guns."""
+    guns = np.repeat(np.array([tuple(pack(gun))], _GUN), count)
+    valid = np.ones(count, dtype=np.bool_)
+    for name, column in columns.items():
         valid &= _is_allowed(name, column)
         guns[_FIELDS[name]] = column == _OPTIONS[name][1] if name in _OPTIONS else column.astype(np.float64)
-    if gun.return_friction_N is None and "return_friction_N" not in arrays:
+    if gun.return_friction_N is None and "return_friction_N" not in columns:
         guns["friction_back"] = guns["friction_out"]
-    _reduce(guns, model_number(fidelity))
+    _reduce(guns, model)
     return guns, valid
 
 
@@ -264,21 +285,16 @@ def _reduce(guns: Records, model: int) -> None:
         guns["back_emf"], guns["opens"] = 0.0, True
 
 
-def _run(
-    run: Callable[[Records, Records], None],
-    guns: Records,
-    results: Records,
-    cores: int | None,
-    progress: Callable[[int], object],
-) -> None:
-    def one(start: int) -> int:
-        chunk = slice(start, start + _CHUNK)
-        run(guns[chunk], results[chunk])
-        return len(guns[chunk])
-
-    with ThreadPoolExecutor(cores) as pool:  # the compiled code holds no lock
-        for count in pool.map(one, range(0, len(guns), _CHUNK)):
-            progress(count)
+def _results(shoot: Callable[[Records, Records], None], guns: Records, valid: NDArray[np.bool_]) -> Records:
+    """The results of these guns' shots; nothing, where there is no gun."""
+    results = np.full(len(guns), _NOTHING)
+    if valid.all():
+        shoot(guns, results)
+    else:
+        among = results[valid]
+        shoot(guns[valid], among)
+        results[valid] = among
+    return results
 
 
 def _shoot_compiled(code: MachineCode, guns: Records, results: Records) -> None:

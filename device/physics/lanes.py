@@ -41,6 +41,7 @@ from device.physics.equations import (
 from device.physics.polynomial import (
     NEAR_ROOT,
     NO_DIGIT,
+    falls,
     least_sum,
     least_sum_past_first,
     to_bernstein,
@@ -217,11 +218,16 @@ def end_steps(r: Any, chosen: Any, at: Any, event: Any) -> None:
 def first_crossings(r: Any, w: Any, needed: Any) -> Any:
     """`first_crossing` of the polynomials in `other` in lanes; 0 where it does not begin above 0."""
     above = w.other[0] > 0.0
+    at, falling, end = where(above, 2.0, 0.0), falls(w.other) > 0.0, value_at_end(w.other)
+    some, others = needed & above & falling & (end <= 0.0), needed & above & ~falling
+    if bits(some) != 0:
+        at = where(some, falling_roots(w, end, alike(1.0), some), at)
+    if bits(others) == 0:
+        return at
     to_bernstein(w)
     changes = sign_changes_of(w.bernstein)
-    let_leave(r, needed & above & (changes > 1.0))
-    some = needed & above & (changes == 1.0)
-    at = where(above, 2.0, 0.0)
+    let_leave(r, others & (changes > 1.0))
+    some = others & (changes == 1.0)
     return where(some, roots_of(w, alike(1.0), some), at) if bits(some) != 0 else at
 
 
@@ -246,9 +252,22 @@ def polygon_roots(b: Any) -> Any:
 
 def roots_of(w: Any, high: Any, needed: Any) -> Any:
     """`bracketed_root` from 0 to `high` in lanes."""
-    c, b = w.other, w.bernstein
+    b = w.bernstein
     sign = where((b[0] > 0.0) | ((b[0] == 0.0) & (b[ORDER] < 0.0)), 1.0, -1.0)
-    s = high * polygon_roots(b)
+    return newton_roots(w.other, sign, high, high * polygon_roots(b), needed)
+
+
+def falling_roots(w: Any, end: Any, high: Any, needed: Any) -> Any:
+    """`falling_crossing` in lanes, of which those that are needed have one."""
+    c = w.other
+    bent = (end - c[0] - c[1] * high) / (high * high)
+    s = 2.0 * c[0] / (math.sqrt(max(c[1] * c[1] - 4.0 * bent * c[0], 0.0)) - c[1])
+    s = where((s > 0.0) & (s < high), s, 0.5 * high)
+    return newton_roots(c, alike(1.0), high, s, needed)
+
+
+def newton_roots(c: Any, sign: Any, high: Any, s: Any, needed: Any) -> Any:
+    """`newton_root` from 0 to `high` in lanes."""
     low, before, found = alike(0.0), alike(0.0), s
     for _ in range(80):
         y, slope = value_and_slope(c, s)
@@ -296,7 +315,7 @@ def land_at_events(p: Any, r: Any, w: Any) -> None:
 
 def find_peaks(p: Any, r: Any, w: Any) -> None:
     """The recoil stage's peaks so far."""
-    heading, used = r[HEADING], r[USED]
+    heading = r[HEADING]
     pushed = (r[BUSY] > 0.0) & (r[STAGE] != float(OVER)) & ((heading > 0.0) | (r[U] > 0.0))
     if bits(pushed) == 0:
         return
@@ -308,12 +327,22 @@ def find_peaks(p: Any, r: Any, w: Any) -> None:
         w.other[n] = (n + 1) * w.v[n + 1]
     w.other[ORDER] = 0.0
     rises = pushed & (-least_sum(w.other, -1.0) > (best + SAME_FORCE * abs(best)) * r[SPAN] / p.mass)
-    if bits(rises) == 0:
-        return
+    if bits(rises) != 0:
+        find_tops(p, r, w, rises)
+
+
+def find_tops(p: Any, r: Any, w: Any, rises: Any) -> None:
+    """`peak_force` in lanes where the force may rise above its ends."""
+    used = r[USED]
     for n in range(ORDER - 1):
         w.other[n] = (n + 1) * (n + 2) * w.v[n + 2]
     w.other[ORDER - 1] = 0.0
-    rises = rises & ~(least_sum(w.other, where(w.other[0] < 0.0, -1.0, 1.0)) > 0.0)
+    end = where(used < 1.0, value_at(w.other, used), value_at_end(w.other))
+    falling = falls(w.other) > 0.0
+    tops = rises & falling & (w.other[0] > 0.0) & (end <= 0.0)
+    if bits(tops) != 0:
+        see_tops(p, r, w, tops, falling_roots(w, end, used, tops))
+    rises = rises & ~falling
     if bits(rises) == 0:
         return
     if bits(rises & (used < 1.0)) != 0:
@@ -324,8 +353,13 @@ def find_peaks(p: Any, r: Any, w: Any) -> None:
     let_leave(r, rises & (changes > 1.0))
     tops = rises & (changes == 1.0)
     if bits(tops) != 0:
-        at = roots_of(w, used, tops)
-        r[PEAK] = where(tops, max(best, force_of(p, heading, value_at(w.x, at), value_at(w.i, at))), r[PEAK])
+        see_tops(p, r, w, tops, roots_of(w, used, tops))
+
+
+def see_tops(p: Any, r: Any, w: Any, tops: Any, at: Any) -> None:
+    """The force at its tops in these lanes, whose largest so far is in `r`."""
+    top = force_of(p, r[HEADING], value_at(w.x, at), value_at(w.i, at))
+    r[PEAK] = where(tops, max(r[PEAK], top), r[PEAK])
 
 
 # Between the steps: one lane at a time

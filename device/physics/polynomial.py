@@ -1,8 +1,9 @@
 """Roots of the series over one step, s from 0 to 1: none is missed.
 
-In the Bernstein basis a polynomial has at most as many roots in an interval as its coefficients change sign, so no
-change means no root and one change exactly one (Descartes' rule of signs; Farouki, CAGD 29 (2012) 379, section 3.5).
-Where there are more, the interval is halved.
+Most polynomials fall all the way, as sums of their coefficients show: there is one root if the end is not above 0. Of
+others the Bernstein basis tells: in it a polynomial has at most as many roots in an interval as its coefficients change
+sign, so no change means no root and one change exactly one (Descartes' rule of signs; Farouki, CAGD 29 (2012) 379,
+section 3.5). Where there are more, the interval is halved.
 """
 
 from __future__ import annotations
@@ -114,6 +115,26 @@ least_sum_past_first = _least_sum("least_sum_past_first", 1)
 """The same without the first coefficient, for the rest of the polynomial divided by s."""
 
 
+def _falls() -> Callable[[Coefficients], float]:
+    """Sums of -p', sums of those, and sums of those; of each but the last sort the last one alone matters."""
+    lines = [f"s{n} = {f's{n - 1} - ' if n > 1 else '-'}{n}.0 * c[{n}]" for n in range(1, ORDER + 1)]
+    lines += [f"t{n} = {f't{n - 1} + ' if n > 1 else ''}s{n}" for n in range(1, ORDER)]
+    lines += [f"u{n} = {f'u{n - 1} + ' if n > 1 else ''}t{n}" for n in range(1, ORDER - 1)]
+    least = ", ".join([f"s{ORDER}", f"t{ORDER - 1}", *(f"u{n}" for n in range(1, ORDER - 1))])
+    function: Callable[[Coefficients], float] = from_text(
+        "falls", "\n    ".join(["def falls(c):", *lines, f"return min({least})"])
+    )
+    return function
+
+
+falls = _falls()
+"""Above 0 only where the polynomial falls all the way from 0 to 1; where it may rise, or is no number, it is not.
+
+As for `least_sum`, but summed by parts three times: -p' is then (1 - s)^3 times the sum of u_n s^(n - 1), and two
+terms for the last t and the last s, so that it is above 0 where all of these are.
+"""
+
+
 def _value_at_end() -> Callable[[Coefficients], float]:
     """The small coefficients first."""
     even, odd = (" + ".join(f"c[{j}]" for j in range(last, 0, -2)) for last in (ORDER, ORDER - 1))
@@ -152,14 +173,37 @@ def sign_changes(b: Coefficients) -> int:
 
 
 def bracketed_root(w: StepSeries, low: float, high: float) -> float:
-    """The one root between `low` and `high` of the polynomial in `other`: Newton's method, kept inside by halving.
+    """The one root between `low` and `high` of the polynomial in `other`, with its Bernstein coefficients over them.
 
-    The polygon of the Bernstein coefficients over the bracket crosses 0 near the root. Each step soon is a constant
-    times the square of the one before it; the next one is not made if it would move no digit.
+    Their polygon crosses 0 near the root.
     """
-    c, b = w.other, w.bernstein
+    b = w.bernstein
     sign = 1.0 if b[0] > 0.0 or (b[0] == 0.0 and b[ORDER] < 0.0) else -1.0
-    s, before = low + (high - low) * polygon_root(b), 0.0
+    return newton_root(w.other, sign, low, high, low + (high - low) * polygon_root(b))
+
+
+def falling_crossing(c: Coefficients, high: float) -> float:
+    """Where a polynomial that falls from 0 to `high` falls below 0; 2 if it begins there or never does."""
+    end = value_at(c, high) if high < 1.0 else value_at_end(c)
+    if not (c[0] > 0.0 and end <= 0.0):
+        return 2.0
+    return newton_root(c, 1.0, 0.0, high, parabola_root(c[0], c[1], end, high))
+
+
+def parabola_root(first: float, slope: float, end: float, high: float) -> float:
+    """Where the parabola with this first value, slope and value at `high` falls below 0."""
+    bent = (end - first - slope * high) / (high * high)
+    s = 2.0 * first / (math.sqrt(max(slope * slope - 4.0 * bent * first, 0.0)) - slope)
+    return s if 0.0 < s < high else 0.5 * high
+
+
+def newton_root(c: Coefficients, sign: float, low: float, high: float, s: float) -> float:
+    """The one root between `low`, where the polynomial has this sign, and `high`: Newton's method from s on.
+
+    It is kept inside by halving. Each step soon is a constant times the square of the one before it; the next one is
+    not made if it would move no digit.
+    """
+    before = 0.0
     for _ in range(80):
         y, slope = value_and_slope(c, s)
         if y == 0.0:
@@ -189,6 +233,9 @@ def polygon_root(b: Coefficients) -> float:
 
 def first_crossing(w: StepSeries) -> float:
     """The first s in (0, 1] where the polynomial in `other`, above 0 just after s = 0, falls below it; 2 if none."""
+    if falls(w.other) > 0.0:
+        w.work += 1
+        return falling_crossing(w.other, 1.0)
     low, width, halved = 0.0, 1.0, False
     bernstein_over(w, low, width)
     while low < 1.0:

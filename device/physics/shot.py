@@ -52,6 +52,8 @@ from device.physics.equations import (
 from device.physics.polynomial import (
     bernstein_over,
     bracketed_root,
+    falling_crossing,
+    falls,
     halve,
     least_sum,
     next_piece,
@@ -155,8 +157,10 @@ def peak_force(p: Constants, s: ShotState, w: StepSeries, best: float) -> float:
     for n in range(ORDER - 1):
         w.other[n] = (n + 1) * (n + 2) * w.v[n + 2]
     w.other[ORDER - 1], w.other[ORDER] = 0.0, 0.0
-    if least_sum(w.other, math.copysign(1.0, w.other[0])) > 0.0:
-        return best  # the force only rises or only falls
+    if falls(w.other) > 0.0:
+        w.work += 1
+        top = falling_crossing(w.other, s.used)
+        return max(best, force_on_hand(p, s.heading, value_at(w.x, top), value_at(w.i, top))) if top < 2.0 else best
     low, width, halved, used = 0.0, s.used, False, s.used
     bernstein_over(w, low, used)
     while low < used:
