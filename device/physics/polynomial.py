@@ -128,7 +128,7 @@ def _falls() -> Callable[[Coefficients], float]:
 
 
 falls = _falls()
-"""Above 0 only where the polynomial falls all the way from 0 to 1; where it may rise, or a coefficient is NaN, it is not.
+"""Above 0 only where the polynomial falls all the way from 0 to 1; not where it may rise, or one is NaN.
 
 As for `least_sum`, but summed by parts three times: -p' is then (1 - s)^3 times the sum of u_n s^(n - 1), and three
 terms at its end, of the last u, t and s, so that it is above 0 where all of these are.
