@@ -71,7 +71,7 @@ def stated_error(fidelity: str, output: str, drive_off: DriveOff, emf: Emf) -> f
 
 
 COSTS = ("closed-form", "no-inductance", "ballistic", "full")
-"""The models, the cheapest first."""
+"""The models, the cheapest first, over both states of the coil: shorted, the two in the middle cost alike."""
 COLLISION = "collision_force_N"
 NEEDED = (*OUTPUTS, COLLISION)
 """What a scene may need."""
