@@ -128,9 +128,10 @@ def examine(
     """
     findings, device = list[DoctorFinding](), load_gun(find(config))
     actuators = map(device.rendering, device.methods)
-    friction_N = max((one.friction_N for one in actuators if isinstance(one, GunParameters)), default=0.0)
+    guns = [one for one in actuators if isinstance(one, GunParameters)]
+    damped = max(guns, key=lambda one: one.friction_N, default=None)
     limit_s = device.serial.round_trip_limit_s
-    planned = checks(results, gun, limit_s, shots=shots, sensor=sensor, friction_N=friction_N, asked=asked)
+    planned = checks(results, gun, limit_s, shots=shots, sensor=sensor, damped=damped, asked=asked)
     with progress("doctor", len(planned)) as tell:
         for check in planned:
             findings += carry_out_check(check)

@@ -16,6 +16,7 @@ from device.parameters import GunParameters
 from device.physics.hand import HandMechanics
 from device.sensor.expected import FINE_S, expected_shot, modelled_acceleration
 from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
+from device.sensor.turn import MeasuredFriction
 from experiments.delivered.marks import MethodLevels, ShotParts, judged_shot
 from experiments.delivered.recorder import parts_of
 
@@ -56,10 +57,21 @@ def measured_shot(
     return found
 
 
-def measured_parts(random: np.random.Generator, actuator: Method, courses: Sequence[np.ndarray]) -> list[ShotParts]:
+def measured_parts(
+    random: np.random.Generator, actuator: Method, courses: Sequence[np.ndarray], noise: float = NOISE_M_S2
+) -> list[ShotParts]:
     """Shots with these courses, as parts of what is expected."""
     expected = expected_of(actuator)
-    return [parts_of(measured_shot(one, random, actuator=actuator), expected) for one in courses]
+    return [parts_of(measured_shot(one, random, noise, actuator), expected) for one in courses]
+
+
+def parts_with(
+    friction: float, uncertain: float, *, peak: float = 1.0, scale: float = 1.0, pull: float = 0.0
+) -> ShotParts:
+    """A shot of this friction for the usual one by a sensor of a scale; with a pull the magnet rests at its turn."""
+    moves_N, rests_N, u_N = (0.0 if pull else scale * friction), scale * (friction + pull), scale * uncertain
+    found = MeasuredFriction(moves_N=moves_N, moves_u_N=u_N, rests_N=rests_N, rests_u_N=u_N, pull_N=pull)
+    return ShotParts(peak=peak, peak_u=0.01, friction=found)
 
 
 def expected_of(actuator: Method) -> ExpectedShot:

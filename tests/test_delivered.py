@@ -23,6 +23,7 @@ from device.sensor.link import SensorEnd
 from device.sensor.measuring import ExpectedShot, SensorTrace, measured
 from device.sensor.process import ShotReply
 from device.sensor.streams import SensorError
+from device.sensor.turn import ExpectedTurn
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.delivered import recorder
@@ -63,12 +64,43 @@ def drawn_trace(friction_N: float, slopes: tuple[float, float], offset: float, a
 def test_a_step_between_two_lines_is_the_friction_whatever_their_slopes(
     friction_N: float, slopes: tuple[float, float], offset: float, at_s: float
 ):
-    expected = ExpectedShot(peak_m_s2=100.0, rise_s=0.0, mass_kg=MASS_KG, turn_s=0.04, friction_N=friction_N)
-    found = measured(drawn_trace(friction_N, slopes, offset, at_s), 0.0, expected)
+    turn = ExpectedTurn(turn_s=0.04, free_s=0.03, enclosure_kg=MASS_KG, magnet_kg=0.114, pull_N=100.0)
+    found = measured(drawn_trace(friction_N, slopes, offset, at_s), 0.0, expected_turning(turn))
     assert found is not None
-    assert found.friction_N == pytest.approx(friction_N, rel=1e-6, abs=0.02)
+    assert found.friction is not None
+    assert found.friction.at_scale()[0] == pytest.approx(friction_N, rel=1e-6, abs=0.02)
     assert found.peak_m_s2 == pytest.approx(100.0, rel=2e-3)  # a parabola for a cosine, 0.3 ms from sample to sample
     assert found.onset_s == pytest.approx(at_s - 0.004 / 3, abs=2e-4)  # where a cosine of 4 ms is at its half
+
+
+@given(
+    friction_N=st.floats(0.3, 3.0),
+    held=st.floats(0.1, 0.9),
+    slope=st.floats(-200, 200),
+    outward=st.floats(0.3, 1.7),
+    scale=st.floats(0.9, 1.1),
+)
+def test_where_the_magnet_rests_the_friction_is_the_leap_s_and_what_the_spring_pulls(
+    friction_N: float, held: float, slope: float, outward: float, scale: float
+):
+    """By the two equations of motion, with a hand's force that is drawn: before the turn, and in the rest after it."""
+    out_N, held_N, magnet_kg, pull_N = outward * friction_N, held * (2 - outward) * friction_N, 0.114, 1.7
+    after = (pull_N - held_N) / magnet_kg
+    before = after - (out_N + held_N) / MASS_KG
+    trace = drawn_trace(0.0, (slope, slope), 0.0, 0.002)
+    late = trace.time_s > 0.012
+    values = trace.acceleration_m_s2 + late * np.where(trace.time_s < 0.04, before, after)
+    turn = ExpectedTurn(
+        turn_s=0.04, free_s=0.03, enclosure_kg=MASS_KG, magnet_kg=magnet_kg, pull_N=pull_N, outward=outward
+    )
+    found = measured(SensorTrace(time_s=trace.time_s, acceleration_m_s2=scale * values), 0.0, expected_turning(turn))
+    assert found is not None
+    assert found.friction is not None
+    assert found.friction.at_scale(scale)[0] == pytest.approx(friction_N, abs=0.05 / outward)
+
+
+def expected_turning(turn: ExpectedTurn) -> ExpectedShot:
+    return ExpectedShot(peak_m_s2=100.0, rise_s=0.0, turn=turn, friction_N=1.0)
 
 
 def test_where_the_magnet_turns_the_acceleration_leaps_by_twice_the_friction_over_the_mass():
@@ -97,7 +129,7 @@ def test_the_uncertainty_is_how_far_measurements_lie_apart():
     random, of = np.random.default_rng(5), course(DAMPED)
     shots = [measured_shot(of, random) for _ in range(120)]
     for values, uncertain in (
-        ([one.friction_N for one in shots], [one.friction_u_N for one in shots]),
+        tuple(zip(*[one.friction.at_scale() for one in shots if one.friction is not None], strict=True)),
         ([one.peak_m_s2 for one in shots], [one.peak_u_m_s2 for one in shots]),
     ):
         ratio = float(np.std(np.array(values, dtype=float)) / np.mean(np.array(uncertain, dtype=float)))

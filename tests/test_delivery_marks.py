@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,19 +15,18 @@ from experiments.delivered.marks import (
     SUM_LIMIT,
     Z_LIMIT,
     DeliveryLevel,
-    ShotParts,
     after_shot,
     start_limit,
 )
-from tests.delivered_chain import DAMPED, LIGHT, course, marks_of, measured_parts, slipped
+from tests.delivered_chain import DAMPED, LIGHT, course, marks_of, measured_parts, parts_with, slipped
 
 
 def test_the_limits_leave_one_false_mark_in_10000():
-    """Shiryaev and Roberts: e^A shots to a false mark; a mean that is looked at after n shots has a share of n/2."""
+    """Shiryaev and Roberts: e^A shots to a change that is none, of three marks; a mean after n shots counts n/2."""
     tails = 4 * 0.5 * math.erfc(Z_LIMIT / math.sqrt(2))
     looks = [START_SHOTS * 2**i for i in range(5)]
     starts = sum(math.erfc(start_limit(shots) / math.sqrt(2)) for shots in looks) / looks[-1]
-    assert 2 * math.exp(-SUM_LIMIT) + tails + starts <= 1e-4 + 1e-12
+    assert 2 * 3 * math.exp(-SUM_LIMIT) + tails + starts <= 1e-4 + 1e-12
 
 
 def test_without_a_change_each_hypothesis_has_a_ratio_of_1_on_average():
@@ -42,7 +40,9 @@ def test_without_a_change_each_hypothesis_has_a_ratio_of_1_on_average():
     for node in nodes:
         after, _ = after_shot(level, level.mean + deviation * float(np.clip(node, -4.5, 4.5)), 0.05)
         ratios.append(np.exp(after.ups - np.append(level.ups, 0.0)))
-    assert weights @ np.array(ratios) / math.sqrt(2 * math.pi) == pytest.approx(np.ones(4), abs=1e-3)
+    assert weights @ np.array(ratios) / math.sqrt(2 * math.pi) == pytest.approx(
+        np.ones(4), abs=2e-3
+    )  # less what lies beyond 4.5
 
 
 def test_a_damper_that_slips_is_seen_within_three_shots_and_a_good_one_is_not_marked():
@@ -55,10 +55,10 @@ def test_a_damper_that_slips_is_seen_within_three_shots_and_a_good_one_is_not_ma
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("start", [8, 15, 40])
+@pytest.mark.parametrize("start", [12, 20, 40])
 def test_a_lasting_change_is_seen_whenever_it_comes_and_until_it_is_mended(start: int, sign: int):
-    shots = [ShotParts(peak=1.0, peak_u=0.01, friction=1.0, friction_u=0.05)] * start
-    bad = [replace(shots[0], friction=1.0 + 0.1 * sign)] * 60
+    shots = [parts_with(1.0, 0.05)] * start
+    bad = [parts_with(1.0 + 0.1 * sign, 0.05)] * 60
     marks = marks_of([*shots, *bad, *shots[:3]])
     assert not any(marks[:start])
     assert marks[start + 59] == "slipped"
@@ -73,14 +73,32 @@ def test_a_slip_from_a_method_s_first_shot_on_is_seen_against_the_model_and_said
         assert not any(marks_of(measured_parts(random, actuator, [course(actuator)] * 24)))
 
 
-def test_where_the_magnet_rests_at_its_turn_its_step_is_less_and_no_mean_is_held_against_the_model():
-    random = np.random.default_rng(9)
-    firm = course(DAMPED, HandMechanics(stiffness_N_m=500.0, damping_N_s_m=20.0))
-    shots = measured_parts(random, DAMPED, [firm] * 24)
-    assert all(one.rests for one in shots)
-    assert all(one.friction < 0.9 for one in shots)
-    assert not any(marks_of(shots))
-    assert not any(one.rests for one in measured_parts(random, DAMPED, [course(DAMPED)] * 12))
+def test_a_firm_hand_holds_the_magnet_at_its_turn_and_its_friction_is_known_all_the_same():
+    random, firm = np.random.default_rng(9), HandMechanics(stiffness_N_m=500.0, damping_N_s_m=20.0)
+    good, bad = (measured_parts(random, DAMPED, [course(slipped(DAMPED, slip), firm)] * 24) for slip in (0.0, 0.1))
+    for shots, friction in ((good, 1.0), (bad, 0.9)):
+        leaps = [one.friction.moves_N / one.usual_N for one in shots if one.friction is not None]
+        parts = [one.friction.at_scale()[0] / one.usual_N for one in shots if one.friction is not None]
+        assert max(leaps) < 0.88  # half of the leap alone says much less
+        assert np.mean(parts) == pytest.approx(friction, abs=0.02)
+    assert not any(marks_of(good))
+    marks = marks_of([*good[:12], *bad[:5]])
+    assert not any(marks[:12])
+    assert any(marks[12:])
+
+
+def test_a_damper_that_was_forgotten_is_seen_at_the_first_shot():
+    random = np.random.default_rng(11)
+    assert marks_of(measured_parts(random, DAMPED, [course(LIGHT)] * 3)) == ["outside"] * 3
+
+
+def test_a_sensor_of_another_scale_is_known_by_the_peaks_and_no_shot_is_marked_for_it():
+    random, hand = (
+        np.random.default_rng(10),
+        HandMechanics(stiffness_N_m=435.0, damping_N_s_m=13.2),
+    )  # rests, now and then
+    for scale in (0.95, 1.05):
+        assert not any(marks_of(measured_parts(random, DAMPED, [scale * course(DAMPED, hand)] * 24)))
 
 
 def test_one_shot_far_off_is_marked_at_once_and_teaches_nothing():

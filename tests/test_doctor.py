@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 
 from analysis.report.serial import plain
 from device import LinkError
+from device.parameters import GunParameters
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
@@ -588,7 +589,7 @@ def test_a_display_that_nobody_serves_fails_with_what_to_do_and_stops_nothing(tm
     ],
 )
 def test_a_simulated_sensor_is_one_check_among_all(tmp_path: Path, sensor: str, verdict: str, said: str) -> None:
-    planned = checks(tmp_path, "simulated", 0.01, sensor=sensor, friction_N=1.12)
+    planned = checks(tmp_path, "simulated", 0.01, sensor=sensor, damped=GunParameters(friction_N=1.12))
     assert len(planned) == len(checks(tmp_path, "simulated", 0.01)) + 1
     (finding,) = next(carry_out_check(one) for one in planned if one.name == "sensor")
     assert finding.verdict == verdict

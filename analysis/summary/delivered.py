@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.logs.journals import journal_of
-from experiments.delivered.marks import RESTS_BELOW, START_SHOTS
+from experiments.delivered.marks import START_SHOTS
 from experiments.record.journal import ENDING
 from experiments.record.tables import unguard
 from experiments.session.remarks import NOT_DELIVERED
@@ -25,7 +25,7 @@ class DeliveredCourse:
     """A run's shots of a method in their order: peak and friction as parts of what was expected, NaN where unknown.
 
     `numbers` are the places among all shots of the run, from 1; `marks`, and the reasons why, are empty where there is
-    none. `moving`: shots whose friction is known and whose magnet did not rest at its turn.
+    none.
     """
 
     participant: str
@@ -36,7 +36,6 @@ class DeliveredCourse:
     frictions: tuple[float, ...]
     marks: tuple[str, ...]
     reasons: tuple[str, ...]
-    moving: int
     friction_expected: bool
 
     @property
@@ -47,7 +46,12 @@ class DeliveredCourse:
     @property
     def start_unknown(self) -> bool:
         """Whether a slip from the first shot on could not be told, though the method has friction."""
-        return self.friction_expected and self.moving < START_SHOTS
+        return self.friction_expected and self.known_frictions < START_SHOTS
+
+    @property
+    def known_frictions(self) -> int:
+        """Of how many shots the friction is known."""
+        return sum(map(math.isfinite, self.frictions))
 
     @property
     def unmeasured(self) -> int:
@@ -108,7 +112,6 @@ def _course(rows: list[tuple[int, dict[str, str]]]) -> DeliveredCourse:
         frictions=tuple(_part(row, "friction_N") for _, row in rows),
         marks=tuple(row["mark"] for _, row in rows),
         reasons=tuple(unguard(row["because"]) for _, row in rows),
-        moving=sum(float(row["delivered_turn_rise"] or 0) >= RESTS_BELOW for _, row in rows),
         friction_expected=any(row["expected_friction_N"] for _, row in rows),
     )
 

@@ -11,6 +11,7 @@ from device.methods import Method
 from device.parameters import GunParameters
 from device.physics.hand import HandMechanics, Vector, held_acceleration, simulate_held
 from device.sensor.measuring import BEFORE_S, ExpectedShot, SensorTrace, measured
+from device.sensor.turn import ExpectedTurn
 from device.vibration import waveform
 
 _HELD_S = 0.15
@@ -46,9 +47,24 @@ def expected_shot(actuator: Method, rate_Hz: float, hand: HandMechanics | None =
         return None
     top = int(np.abs(course[: round(0.012 / FINE_S)]).argmax())
     rise_s = float(fine[int((np.abs(course) >= abs(course[top]) / 2).argmax())])
-    turn_s = simulate_held(actuator, hand, _HELD_S).turn_s if isinstance(actuator, GunParameters) else None
-    raw = ExpectedShot(peak_m_s2=abs(float(course[top])), rise_s=rise_s, mass_kg=hand.enclosure_mass_kg, turn_s=turn_s)
+    turn = _turn(actuator, hand) if isinstance(actuator, GunParameters) else None
+    raw = ExpectedShot(peak_m_s2=abs(float(course[top])), rise_s=rise_s, turn=turn)
     return _as_measured(raw, fine, course, rate_Hz)
+
+
+def _turn(gun: GunParameters, hand: HandMechanics) -> ExpectedTurn | None:
+    """Where the magnet turns; `None` where it does not, or where no friction is."""
+    shot, friction_N = simulate_held(gun, hand, _HELD_S), (gun.friction_N + gun.homeward_friction_N) / 2
+    if shot.turn_s is None or friction_N == 0:
+        return None
+    return ExpectedTurn(
+        turn_s=shot.turn_s,
+        free_s=shot.turn_s - gun.pulse_s,
+        enclosure_kg=hand.enclosure_mass_kg,
+        magnet_kg=gun.magnet_mass_kg,
+        pull_N=gun.stiffness_N_m * (shot.max_displacement_m + gun.preload_length_m),
+        outward=gun.friction_N / friction_N,
+    )
 
 
 def _as_measured(raw: ExpectedShot, fine: Vector, course: Vector, rate_Hz: float) -> ExpectedShot:
@@ -59,12 +75,11 @@ def _as_measured(raw: ExpectedShot, fine: Vector, course: Vector, rate_Hz: float
         for times in places
         if (shot := measured(SensorTrace(time_s=times, acceleration_m_s2=np.interp(times, fine, course)), 0.0, raw))
     ]
-    frictions = [shot.friction_N for shot in shots if shot.friction_N is not None]
+    frictions = [shot.friction.at_scale()[0] for shot in shots if shot.friction is not None]
     return replace(
         raw,
         peak_m_s2=float(np.mean([shot.peak_m_s2 for shot in shots])),
         peak_sampling_m_s2=float(np.std([shot.peak_m_s2 for shot in shots])),
         rise_s=raw.rise_s + float(np.mean([shot.onset_s for shot in shots])),
         friction_N=float(np.mean(frictions)) if frictions else None,
-        friction_sampling_N=float(np.std(frictions)) if frictions else 0.0,
     )

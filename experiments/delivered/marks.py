@@ -12,9 +12,10 @@ with mean m and variance v + s^2; z is its distance from that in standard deviat
   nothing has changed, so at least e^A shots pass on average until it is e^A, which marks. As long as a change lasts,
   its shots are marked; they teach nothing, and the level is that of the hypothesis.
 - `slipped`, too: the friction beside the peak, which knows no scale of the sensor, is not what the model says from a
-  method's first shot on. That mean is looked at after 10 shots, and whenever they have doubled, and is said once. Only
-  shots count whose magnet does not rest at its turn: a firm hand holds it there, and the step is then less than
-  friction makes.
+  method's first shot on. That mean is looked at after 10 shots, and whenever they have doubled, and is said once.
+
+The friction goes with the sensor's scale, in a firm hand two and a half times (`device.sensor.turn`). What the peaks
+are beside the model's is taken for that scale: the first ones for a run's level, all so far for a method's mean.
 
 The marks of all tests together are false less than once in `1 / FALSE_MARKS` shots: that sets A and the limits.
 """
@@ -32,6 +33,7 @@ from experiments.session.remarks import DeliveryMark
 
 if TYPE_CHECKING:
     from device.physics.hand import Vector
+    from device.sensor.turn import MeasuredFriction
 
 FALSE_MARKS = 1e-4
 """Marks a shot while nothing is wrong, at the most."""
@@ -39,15 +41,14 @@ SLIP = 0.10
 """The lasting change that is looked for, of what is expected."""
 _OF_ONE_SHOT, _OF_START = 0.05, 0.25
 """The parts of the false marks that are left to single shots, and to a method's mean against the model."""
-SUM_LIMIT = math.log(2 / FALSE_MARKS / (1 - _OF_ONE_SHOT - _OF_START))
-"""A: with e^A shots to a false mark, peak and friction are false less than so often."""
+_MARKS = 3
+"""A change that is none, but seems to be one, leaves so many marks at the most on average (by trial)."""
+SUM_LIMIT = math.log(2 * _MARKS / FALSE_MARKS / (1 - _OF_ONE_SHOT - _OF_START))
+"""A: with e^A shots to a change that is none, peak and friction are marked falsely less than so often."""
 Z_LIMIT = -NormalDist().inv_cdf(FALSE_MARKS * _OF_ONE_SHOT / 4)
 """Beyond this a single shot is not what the model allows: peak and friction, each up and down."""
-RESTS_BELOW = 0.2
-"""A `turn_rise` of less: the magnet rests at its turn (by the model, below 0.15)."""
-MAY_REST_BELOW, REST_SPREAD = 0.3, 0.05
-"""Assumed, of friction: from where on it is less sure, and how far it spreads where the magnet rests for long. By the
-model, with grips that scatter by a tenth, 0.035."""
+SCALE_SHOTS = 4
+"""So many peaks tell the scale of the sensor; a friction is not learnt from before, as it goes with the scale."""
 START_SHOTS = 10
 """After so many shots a method's mean is first held against the model."""
 MODEL_SPREAD = 0.02
@@ -62,10 +63,10 @@ class DeliverySpread:
     within: float
 
 
-PEAK_SPREAD = DeliverySpread(between=0.05, within=0.02)
+PEAK_SPREAD = DeliverySpread(between=0.05, within=0.015)
 """Assumed: the model's peak moves by 1 % over grips half and twice as firm; a sensor's scale is known to some 3 %."""
-FRICTION_SPREAD = DeliverySpread(between=0.10, within=0.015)
-"""Assumed: over such grips the model's step moves by up to 10 %; within a run a hand's firmness changes by a tenth."""
+FRICTION_SPREAD = DeliverySpread(between=0.10, within=0.010)
+"""Assumed: by the model, grips that scatter by a tenth move it by 0.3 %, and people by 1.4 % beside their peak."""
 
 
 def _none() -> Vector:
@@ -152,34 +153,24 @@ def start_limit(shots: int) -> float:
 class ShotParts:
     """A shot as parts of what is expected, with uncertainties; friction is `None` where it is not known.
 
-    `turn_rise`: as in `device.sensor.measuring.DeliveredShot`.
+    `usual_N`: the friction that is expected.
     """
 
     peak: float
     peak_u: float
-    friction: float | None = None
-    friction_u: float = 0.0
-    turn_rise: float = 1.0
-
-    @property
-    def rests(self) -> bool:
-        """Whether the magnet rested at its turn."""
-        return self.turn_rise < RESTS_BELOW
-
-    @property
-    def friction_spread(self) -> float:
-        """The friction's uncertainty, with what a rest at the turn takes from the step."""
-        rest = min(1.0, max(0.0, 1 - self.turn_rise / MAY_REST_BELOW))
-        return math.hypot(self.friction_u, rest * REST_SPREAD)
+    friction: MeasuredFriction | None = None
+    usual_N: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodLevels:
-    """What a run's shots of a method came to so far."""
+    """What a run's shots of a method came to so far. `scale`: the sensor's, by the first of so many `peaks`."""
 
     peak: DeliveryLevel = field(default_factory=lambda: DeliveryLevel.before(PEAK_SPREAD))
     friction: DeliveryLevel = field(default_factory=lambda: DeliveryLevel.before(FRICTION_SPREAD))
     start: StartLevel = StartLevel()
+    scale: float = 1.0
+    peaks: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,16 +185,28 @@ class ShotVerdict:
 def judged_shot(levels: MethodLevels, shot: ShotParts) -> tuple[MethodLevels, ShotVerdict]:
     """The levels after a shot, and what is said of it: of the peak before the friction, of this before the mean."""
     peak, mark = after_shot(levels.peak, shot.peak, shot.peak_u)
-    found = [ShotVerdict(mark=mark, quantity="peak", change=shot.peak / levels.peak.mean - 1)]
-    levels = replace(levels, peak=peak)
-    if shot.friction is not None:
-        friction, mark = after_shot(levels.friction, shot.friction, shot.friction_spread)
-        found.append(ShotVerdict(mark=mark, quantity="friction", change=shot.friction / levels.friction.mean - 1))
-        levels = replace(levels, friction=friction)
-        if not shot.rests and not any(one.mark for one in found):
-            start, mark = after_start(levels.start, shot.friction / shot.peak, math.hypot(shot.friction_u, shot.peak_u))
-            found.append(ShotVerdict(mark=mark, quantity="friction beside the peak", change=start.mean - 1))
-            levels = replace(levels, start=start)
+    found = ShotVerdict(mark=mark, quantity="peak", change=shot.peak / levels.peak.mean - 1)
+    scale = peak.mean if levels.peaks < SCALE_SHOTS else levels.scale
+    levels = replace(levels, peak=peak, scale=scale, peaks=levels.peaks + 1)
+    if shot.friction is None:
+        return levels, found if found.mark else ShotVerdict()
+    return _judged_friction(levels, shot, shot.friction, found)
+
+
+def _judged_friction(
+    levels: MethodLevels, shot: ShotParts, seen: MeasuredFriction, peak: ShotVerdict
+) -> tuple[MethodLevels, ShotVerdict]:
+    """A friction is held against its level from the first shot on, but it is learnt only once the scale is known."""
+    known = levels.peaks > SCALE_SHOTS
+    so_far = [of_N / shot.usual_N for of_N in seen.at_scale(levels.peak.mean, math.sqrt(levels.peak.variance))]
+    part, part_u = [of_N / shot.usual_N for of_N in seen.at_scale(levels.scale)] if known else so_far
+    friction, mark = after_shot(levels.friction, part, part_u)
+    found = [peak, ShotVerdict(mark=mark, quantity="friction", change=part / levels.friction.mean - 1)]
+    levels = replace(levels, friction=friction if known else levels.friction)
+    if not any(one.mark for one in found):
+        start, mark = after_start(levels.start, *so_far)
+        found.append(ShotVerdict(mark=mark, quantity="friction beside the peak", change=start.mean - 1))
+        levels = replace(levels, start=start)
     return levels, next((one for one in found if one.mark), ShotVerdict())
 
 

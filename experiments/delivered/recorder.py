@@ -6,6 +6,7 @@ A run without a sensor has neither wrapper.
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -240,13 +241,13 @@ class ShotRecorder:
             onset_u_s=round(seen.onset_u_s, 7),
             peak_m_s2=round(seen.peak_m_s2, 3),
             peak_u_m_s2=round(seen.peak_u_m_s2, 3),
-            friction_N=None if seen.friction_N is None else round(seen.friction_N, 5),
-            friction_u_N=None if seen.friction_u_N is None else round(seen.friction_u_N, 5),
-            turn_rise=None if seen.turn_rise is None else round(seen.turn_rise, 3),
         )
-        levels = self._levels.get(found.method, MethodLevels())
-        self._levels[found.method], verdict = judged_shot(levels, parts_of(seen, expected))
-        return replace(found, mark=verdict.mark, because=reason_of(verdict, seen))
+        levels, verdict = judged_shot(self._levels.get(found.method, MethodLevels()), parts_of(seen, expected))
+        self._levels[found.method] = levels
+        if seen.friction is not None:
+            friction_N, friction_u_N = seen.friction.at_scale(levels.scale, math.sqrt(levels.peak.variance))
+            found = replace(found, friction_N=round(friction_N, 5), friction_u_N=round(friction_u_N, 5))
+        return replace(found, mark=verdict.mark, because=reason_of(verdict, found))
 
     def _want_again(self, live: LiveRun, found: ShotMeasured) -> None:
         """Where the design says so, the trial is to come again, once."""
@@ -285,20 +286,20 @@ _HEARD = "The sensor is heard again."
 def parts_of(seen: DeliveredShot, expected: ExpectedShot) -> ShotParts:
     """A shot as parts of what is expected of it."""
     peak = ShotParts(peak=seen.peak_m_s2 / expected.peak_m_s2, peak_u=seen.peak_u_m_s2 / expected.peak_m_s2)
-    if seen.friction_N is None or seen.friction_u_N is None or not expected.friction_N:
+    found, usual_N = seen.friction, expected.friction_N
+    if found is None or not usual_N:
         return peak
-    friction, friction_u = seen.friction_N / expected.friction_N, seen.friction_u_N / expected.friction_N
-    return replace(peak, friction=friction, friction_u=friction_u, turn_rise=seen.turn_rise or 0.0)
+    return replace(peak, friction=found, usual_N=usual_N)
 
 
-def reason_of(verdict: ShotVerdict, seen: DeliveredShot) -> str:
+def reason_of(verdict: ShotVerdict, shot: ShotMeasured) -> str:
     """Why a shot is marked; empty if it is not."""
     far = f"{100 * verdict.change:+.0f} %"
     match verdict.quantity:
         case "peak":
-            return f"peak {seen.peak_m_s2:.3g} m/s², {far} from the shots before"
+            return f"peak {shot.peak_m_s2:.3g} m/s², {far} from the shots before"
         case "friction":
-            return f"friction {seen.friction_N:.3g} N, {far} from the shots before"
+            return f"friction {shot.friction_N:.3g} N, {far} from the shots before"
         case "friction beside the peak":
             return f"friction beside the peak, {far} from the model since the method's first shot"
     return ""

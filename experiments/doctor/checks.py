@@ -28,6 +28,7 @@ from typing import IO, TypeVar
 from pydantic import TypeAdapter
 
 from device import DeviceError, open_gun
+from device.parameters import GunParameters
 from device.plugin.conformance import conformance, rig_at
 from device.serial_gun.gun import speed_of
 from experiments.catalogues.catalogue import language
@@ -201,13 +202,13 @@ def checks(
     *,
     shots: int = 0,
     sensor: str = "",
-    friction_N: float = 0.0,
+    damped: GunParameters | None = None,
     asked: LanguageAsked | None = None,
 ) -> tuple[Check, ...]:
     """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back.
 
     With `shots` the gun is fired, in so many trials: nobody is to hold it. Of a `sensor` it is looked at how soon it
-    would see a change of the friction of the gun's damper.
+    would see a change of the friction of the method that is damped most.
     """
     looks: dict[str, Callable[[], tuple[DoctorFinding, ...]]] = {
         "machine": lambda: (verdicts.of_machine(machine()),),
@@ -215,7 +216,7 @@ def checks(
         "disk": partial(_disk, results),
         "gun": partial(_gun, gun, limit_s),
         **({"shots": partial(_shots, gun, shots)} if shots else {}),
-        **({"sensor": partial(_sensor, sensor, gun, friction_N)} if sensor else {}),
+        **({"sensor": partial(_sensor, sensor, gun, damped)} if sensor else {}),
         "USB adapter": lambda: (verdicts.of_adapters(adapters()),),
         "display": partial(_on_display, "display", "display"),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
@@ -283,10 +284,10 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
     return (verdicts.of_conformance(kept),)
 
 
-def _sensor(address: str, gun: str, friction_N: float) -> tuple[DoctorFinding, ...]:
+def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[DoctorFinding, ...]:
     """A sensor at rest; of the simulated one, what it says of itself. `DeviceError`: it is refused."""
     from device.physics.hand import HandMechanics  # noqa: PLC0415 - as below
-    from device.sensor import link, measuring, simulated  # noqa: PLC0415 - what few rigs have, and slow to import
+    from device.sensor import link, simulated, turn  # noqa: PLC0415 - what few rigs have, and slow to import
     from experiments.delivered.marks import shots_to_see  # noqa: PLC0415
 
     if simulated.measures_by_model(address):
@@ -294,8 +295,10 @@ def _sensor(address: str, gun: str, friction_N: float) -> tuple[DoctorFinding, .
     else:
         with closing(link.SensorLink(address)) as sensor:
             ready = sensor.ready
-    uncertain_N = measuring.friction_uncertainty_N(ready.noise_m_s2, ready.rate_Hz, HandMechanics().enclosure_mass_kg)
-    seen = shots_to_see(uncertain_N / friction_N) if friction_N else None
+    seen = None
+    if damped is not None and damped.friction_N > 0:
+        masses = HandMechanics().enclosure_mass_kg, damped.magnet_mass_kg
+        seen = shots_to_see(turn.friction_uncertainty_N(ready.noise_m_s2, ready.rate_Hz, *masses) / damped.friction_N)
     found = SensorFigures(sensor=address, rate_Hz=ready.rate_Hz, noise_m_s2=ready.noise_m_s2, shots_to_see=seen)
     return (verdicts.of_sensor(found),)
 

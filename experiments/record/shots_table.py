@@ -43,15 +43,14 @@ SHOTS = (
     number_column("delivered_peak_m_s2", "m/s2", "largest acceleration of the recoil"),
     number_column("delivered_peak_uncertainty_m_s2", "m/s2", "its standard uncertainty"),
     number_column("expected_peak_m_s2", "m/s2", "the same by the model, in a hand as assumed"),
-    number_column("delivered_friction_N", "N", "mean friction of the magnet, out and back; empty where no step shows"),
+    number_column(
+        "delivered_friction_N",
+        "N",
+        "mean friction of the magnet, out and back, with the sensor's scale by the run's first peaks; empty where no "
+        "step shows",
+    ),
     number_column("delivered_friction_uncertainty_N", "N", "its standard uncertainty"),
     number_column("expected_friction_N", "N", "the same by the model, in a hand as assumed"),
-    number_column(
-        "delivered_turn_rise",
-        "",
-        "slope of the acceleration after the magnet's turn, as a part of that before; below 0.2 the magnet rests "
-        "there, as in a firm hand, and its friction may be larger than measured",
-    ),
 )
 """The columns of `sub-<ID>_task-<experiment>_shots.csv`."""
 
@@ -62,7 +61,6 @@ _FIELDS = {
     "peak_u_m_s2": "delivered_peak_uncertainty_m_s2",
     "friction_N": "delivered_friction_N",
     "friction_u_N": "delivered_friction_uncertainty_N",
-    "turn_rise": "delivered_turn_rise",
 }
 
 

@@ -113,8 +113,7 @@ class ShotMeasured:
     """What a sensor beside the gun measured of one shot, with standard uncertainties (`_u_`), and what was expected.
 
     `shot` counts from 1 in a presentation, `interval` from 0. `pulse_start_s` is the gun's own word, `onset_s` the
-    measured onset after it. `turn_rise`: of the acceleration, below 0.2 where the magnet rests. What was not
-    measured is `None`; `because` says why there is a mark.
+    measured onset after it. What was not measured is `None`; `because` says why there is a mark.
     """
 
     trial: Trial
@@ -134,7 +133,6 @@ class ShotMeasured:
     friction_N: float | None = None
     friction_u_N: float | None = None
     expected_friction_N: float | None = None
-    turn_rise: float | None = None
     kind: Literal["measured"] = "measured"
 
 

@@ -46,13 +46,13 @@ def _start_unknown(courses: Sequence[DeliveredCourse]) -> Iterator[str]:
     hidden = [one for one in courses if one.start_unknown]
     if hidden:
         named = "; ".join(
-            f"{one.participant}, {one.experiment}, {display_name(one.method)} ({one.moving} of {len(one.marks)} shots)"
+            f"{one.participant}, {one.experiment}, {display_name(one.method)} "
+            f"({one.known_frictions} of {len(one.marks)} shots)"
             for one in hidden
         )
         yield (
             f"A damper that had slipped by 10 % before a method's first shot could not be told in: {named}. For that "
-            f"{START_SHOTS} shots are needed whose friction is known and whose magnet does not rest at its turn, where "
-            "a firm hand holds it. Compare the levels below."
+            f"{START_SHOTS} shots are needed whose friction is known. Compare the levels below."
         )
 
 
