@@ -17,11 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from device.methods import paper_methods
+from device.parameters import GunParameters
 from device.physics.hand import HandMechanics, held_acceleration, simulate_held
-from device.sensor.expected import expected_shot
+from device.sensor.expected import NO_COURSE, expected_shot
 from device.sensor.link import SensorEnd
 from device.sensor.measuring import ExpectedShot, SensorTrace, measured
 from device.sensor.process import ShotReply
+from device.sensor.simulated import SimulatedSensor
 from device.sensor.streams import SensorError
 from device.sensor.turn import ExpectedTurn
 from experiments.clock import RealClock, VirtualClock
@@ -36,7 +38,7 @@ from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.watch.runs import RunSoFar
 from tests.at_controls import short_direction
-from tests.delivered_chain import DAMPED, RATE_HZ, course, measured_shot
+from tests.delivered_chain import DAMPED, RATE_HZ, course, measured_shot, seen
 
 MASS_KG = 0.2262
 
@@ -64,7 +66,7 @@ def drawn_trace(friction_N: float, slopes: tuple[float, float], offset: float, a
 def test_a_step_between_two_lines_is_the_friction_whatever_their_slopes(
     friction_N: float, slopes: tuple[float, float], offset: float, at_s: float
 ):
-    turn = ExpectedTurn(turn_s=0.04, free_s=0.03, enclosure_kg=MASS_KG, magnet_kg=0.114, pull_N=100.0)
+    turn = ExpectedTurn(turn_s=0.04, free_s=0.03, enclosure_kg=MASS_KG, magnet_kg=0.114, pull_N=100.0, friction_N=1.0)
     found = measured(drawn_trace(friction_N, slopes, offset, at_s), 0.0, expected_turning(turn))
     assert found is not None
     assert found.friction is not None
@@ -91,7 +93,13 @@ def test_where_the_magnet_rests_the_friction_is_the_leap_s_and_what_the_spring_p
     late = trace.time_s > 0.012
     values = trace.acceleration_m_s2 + late * np.where(trace.time_s < 0.04, before, after)
     turn = ExpectedTurn(
-        turn_s=0.04, free_s=0.03, enclosure_kg=MASS_KG, magnet_kg=magnet_kg, pull_N=pull_N, outward=outward
+        turn_s=0.04,
+        free_s=0.03,
+        enclosure_kg=MASS_KG,
+        magnet_kg=magnet_kg,
+        pull_N=pull_N,
+        friction_N=1.0,
+        outward=outward,
     )
     found = measured(SensorTrace(time_s=trace.time_s, acceleration_m_s2=scale * values), 0.0, expected_turning(turn))
     assert found is not None
@@ -144,6 +152,30 @@ def test_rest_is_no_shot_and_too_few_samples_are_refused():
     assert measured(rest, 0.0, expected) is None
     with pytest.raises(ValueError, match=r"at least 10 are needed to know the noise by"):
         measured(rest, -0.05, expected)
+
+
+@pytest.mark.parametrize("rate_Hz", [1500.0, RATE_HZ, 8000.0])
+@pytest.mark.parametrize("drive", [{}, {"voltage_V": 6.0}, {"voltage_V": 2.0}, {"pulse_s": 0.003}, {"pulse_s": 0.06}])
+def test_a_friction_is_measured_where_the_model_s_own_course_gives_it_and_nowhere_else(
+    rate_Hz: float, drive: dict[str, float]
+):
+    """Of a weak or a short pulse the turn lies among other steps; the peak is measured all the same."""
+    random = np.random.default_rng(3)
+    for method in ("asymmetric-1", "asymmetric-2"):
+        gun = replace(paper_methods()[method], **drive)
+        expected = expected_shot(gun, rate_Hz)
+        assert expected is not None
+        assert (expected.turn is None) == (expected.friction_N is None)
+        if expected.friction_N is not None:
+            assert expected.friction_N == pytest.approx(gun.friction_N, rel=0.15)
+        for _ in range(5):
+            assert measured(seen(course(gun), random, 0.5), 0.0, expected) is not None
+
+
+@pytest.mark.parametrize("gun", [GunParameters(friction_N=0.02), GunParameters(friction_N=1.12, stiffness_N_m=100.0)])
+def test_a_shot_that_the_model_does_not_bring_to_an_end_is_not_measured_and_ends_no_run(gun: GunParameters):
+    sensor = SimulatedSensor("simulated", "simulated", np.random.default_rng(1))
+    assert sensor.ask(0.0, gun).because == NO_COURSE
 
 
 # beside a run

@@ -11,6 +11,7 @@ from device.physics.hand import HandMechanics
 from experiments.delivered.marks import (
     FRICTION_SPREAD,
     PEAK_SPREAD,
+    SCALE_SHOTS,
     START_SHOTS,
     SUM_LIMIT,
     Z_LIMIT,
@@ -33,7 +34,7 @@ def test_without_a_change_each_hypothesis_has_a_ratio_of_1_on_average():
     """Which the bound of false marks rests on: over what the next shot may be, by Gauss and Hermite."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     level = DeliveryLevel.before(FRICTION_SPREAD)
-    for part in (1.01, 0.97, 1.02):
+    for part in (1.01, 0.97, 1.02, 0.99, 1.0, 1.01):
         level, _ = after_shot(level, part, 0.05)
     deviation = math.sqrt(level.variance + FRICTION_SPREAD.within**2 + 0.05**2)
     ratios = []
@@ -67,8 +68,8 @@ def test_a_lasting_change_is_seen_whenever_it_comes_and_until_it_is_mended(start
 
 def test_a_slip_from_a_method_s_first_shot_on_is_seen_against_the_model_and_said_once():
     random = np.random.default_rng(8)
-    for actuator in (DAMPED, LIGHT):
-        marks = marks_of(measured_parts(random, actuator, [course(slipped(actuator, 0.1))] * 48))
+    for actuator, slip in ((DAMPED, 0.1), (LIGHT, 0.25)):
+        marks = marks_of(measured_parts(random, actuator, [course(slipped(actuator, slip))] * 48))
         assert [mark for mark in marks if mark] == ["slipped"]
         assert not any(marks_of(measured_parts(random, actuator, [course(actuator)] * 24)))
 
@@ -109,6 +110,13 @@ def test_one_shot_far_off_is_marked_at_once_and_teaches_nothing():
     after, mark = after_shot(level, 0.5, 0.01)
     assert mark != ""
     assert (after.mean, after.variance) == (level.mean, level.variance)
+
+
+@pytest.mark.parametrize("first", [0.6, 0.75, 0.85, 0.9, 1.1, 1.2, 1.4])
+def test_a_first_shot_that_was_odd_does_not_mark_all_that_follow(first: float):
+    good = [parts_with(1.0, 0.01)] * 60
+    assert sum(map(bool, marks_of([parts_with(1.0, 0.01, peak=first), *good]))) <= 3
+    assert sum(map(bool, marks_of([*good[:SCALE_SHOTS], parts_with(first, 0.01), *good]))) <= 3
 
 
 def test_a_run_has_its_own_level():

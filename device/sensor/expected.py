@@ -14,10 +14,14 @@ from device.sensor.measuring import BEFORE_S, ExpectedShot, SensorTrace, measure
 from device.sensor.turn import ExpectedTurn
 from device.vibration import waveform
 
+NO_COURSE = "nothing moves in this shot by the model, or it does not come to an end"
+"""Why a shot is not measured of which nothing is expected."""
 _HELD_S = 0.15
 """The held shot is reckoned for so long: past every magnet's turn."""
 FINE_S = 2e-5
 """From one moment of a modelled course to the next."""
+CLEAN = 0.15
+"""A friction is measured where the model's own course gives it to so much; else other steps lie too near."""
 _PLACES = 4
 """So many places between two samples the onset is put at."""
 
@@ -35,13 +39,16 @@ def modelled_acceleration(actuator: Method, time_s: Vector, hand: HandMechanics 
 
 @lru_cache(maxsize=64)
 def expected_shot(actuator: Method, rate_Hz: float, hand: HandMechanics | None = None) -> ExpectedShot | None:
-    """What is expected of a shot at so many samples a second; `None` where nothing moves.
+    """What is expected of a shot at so many samples a second; `None` where nothing moves, or the model gives no course.
 
     The means over several places of the samples, and their standard deviations.
     """
     hand = hand or HandMechanics()
     fine = np.arange(0.0, _HELD_S, FINE_S)
-    course = modelled_acceleration(actuator, fine, hand)
+    try:
+        course = modelled_acceleration(actuator, fine, hand)
+    except RuntimeError:  # the magnet sticks and slips without end
+        return None
     peak = float(np.abs(course).max())
     if peak == 0.0:
         return None
@@ -63,6 +70,7 @@ def _turn(gun: GunParameters, hand: HandMechanics) -> ExpectedTurn | None:
         enclosure_kg=hand.enclosure_mass_kg,
         magnet_kg=gun.magnet_mass_kg,
         pull_N=gun.stiffness_N_m * (shot.max_displacement_m + gun.preload_length_m),
+        friction_N=friction_N,
         outward=gun.friction_N / friction_N,
     )
 
@@ -76,10 +84,14 @@ def _as_measured(raw: ExpectedShot, fine: Vector, course: Vector, rate_Hz: float
         if (shot := measured(SensorTrace(time_s=times, acceleration_m_s2=np.interp(times, fine, course)), 0.0, raw))
     ]
     frictions = [shot.friction.at_scale()[0] for shot in shots if shot.friction is not None]
+    found = raw.turn is not None and len(frictions) == len(shots) > 0
+    friction_N = float(np.mean(frictions)) if found else None
+    clean = raw.turn is not None and friction_N is not None and abs(friction_N / raw.turn.friction_N - 1) < CLEAN
     return replace(
         raw,
         peak_m_s2=float(np.mean([shot.peak_m_s2 for shot in shots])),
         peak_sampling_m_s2=float(np.std([shot.peak_m_s2 for shot in shots])),
         rise_s=raw.rise_s + float(np.mean([shot.onset_s for shot in shots])),
-        friction_N=float(np.mean(frictions)) if frictions else None,
+        turn=raw.turn if clean else None,
+        friction_N=friction_N if clean else None,
     )

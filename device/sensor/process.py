@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from device.methods import Method
-from device.sensor.expected import expected_shot
+from device.sensor.expected import NO_COURSE, expected_shot
 from device.sensor.measuring import BEFORE_S, DeliveredShot, ExpectedShot, SensorTrace, measured
 from device.sensor.streams import ClockLine, Sample, SensorClock
 
@@ -24,7 +24,7 @@ LOOK_EVERY_S = 0.2
 """So often it is looked whether a sensor is silent."""
 LEAST_RATE_HZ = 1500.0
 """With fewer samples a second the recoil's peak, which is over in 2 ms, is lost between them."""
-MAX_GAP_S = 0.005
+MAX_GAP_S = 0.002
 _RATE_STEP = 0.01
 """The rate is taken in steps of 1 %, so that what is expected is reckoned once."""
 
@@ -127,7 +127,7 @@ class SampleBuffer:
         """What was measured of a shot by the read begun at `asked_s`; `None` as long as its trace is not whole."""
         expected = expected_shot(shot.actuator, _stepped(self.rate_Hz)) if self.rate_Hz > LEAST_RATE_HZ else None
         if expected is None:
-            why = "nothing moves in this shot by the model" if self.rate_Hz > LEAST_RATE_HZ else "too few samples"
+            why = NO_COURSE if self.rate_Hz > LEAST_RATE_HZ else "too few samples"
             return ShotReply(number=shot.number, because=why)
         reply = ShotReply(number=shot.number, expected=expected)
         end_s = shot.pulse_start_s + expected.until_s

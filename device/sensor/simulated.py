@@ -5,6 +5,7 @@ It needs no time. `simulated:slip=0.1,after=30` lets the friction of a damper fa
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from device.methods import Method
 from device.parameters import GunParameters
 from device.physics.hand import Vector
-from device.sensor.expected import FINE_S, expected_shot, modelled_acceleration
+from device.sensor.expected import FINE_S, NO_COURSE, expected_shot, modelled_acceleration
 from device.sensor.measuring import BEFORE_S, SensorTrace, measured
 from device.sensor.process import SensorReady, ShotReply
 from device.sensor.streams import SensorError
@@ -95,13 +96,14 @@ class SimulatedSensor:
     def ask(self, pulse_start_s: float, actuator: Method) -> ShotReply:
         """What it would have measured of a shot."""
         self._shots += 1
-        expected = expected_shot(actuator, RATE_HZ)
-        if expected is None:
-            return ShotReply(number=self._shots, because="nothing moves in this shot by the model")
+        expected, course = expected_shot(actuator, RATE_HZ), self._course(self._slipped(actuator))
+        if expected is None or course is None:
+            return ShotReply(number=self._shots, because=NO_COURSE)
         times = np.arange(self._random.uniform() / RATE_HZ - BEFORE_S, _LONG_S, 1 / RATE_HZ)
-        course = np.interp(times, self._fine, self._course(self._slipped(actuator)))
         noise = self._drill.noise * self._random.standard_normal(len(times))
-        trace = SensorTrace(time_s=times + pulse_start_s, acceleration_m_s2=course + noise)
+        trace = SensorTrace(
+            time_s=times + pulse_start_s, acceleration_m_s2=np.interp(times, self._fine, course) + noise
+        )
         return ShotReply(number=self._shots, seen=measured(trace, pulse_start_s, expected), expected=expected)
 
     def close(self) -> None:
@@ -112,7 +114,9 @@ class SimulatedSensor:
             return actuator
         return replace(actuator, friction_N=actuator.friction_N * (1 - self._drill.slip))
 
-    def _course(self, actuator: Method) -> Vector:
+    def _course(self, actuator: Method) -> Vector | None:
+        """`None` where the model gives none."""
         if actuator not in self._courses:
-            self._courses[actuator] = modelled_acceleration(actuator, self._fine)
-        return self._courses[actuator]
+            with suppress(RuntimeError):
+                self._courses[actuator] = modelled_acceleration(actuator, self._fine)
+        return self._courses.get(actuator)

@@ -39,7 +39,7 @@ MAX_RATE_HZ = 6400.0
 class ExpectedTurn:
     """Where a method's magnet turns back by the model: `turn_s` after the onset of its pulse, `free_s` after the end.
 
-    `pull_N`: the spring's P there. `outward`: F_out as a part of the mean friction.
+    `pull_N`: the spring's P there. `friction_N`: the model's mean friction; `outward`: F_out as a part of it.
     """
 
     turn_s: float
@@ -47,12 +47,13 @@ class ExpectedTurn:
     enclosure_kg: float
     magnet_kg: float
     pull_N: float
+    friction_N: float
     outward: float = 1.0
 
     @property
     def until_s(self) -> float:
         """So long after the onset a trace has to go on."""
-        return TURN_WITHIN[1] * self.turn_s + GAP_S + LINE_S
+        return TURN_WITHIN[1] * self.turn_s + 3 * GAP_S + LINE_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +85,8 @@ def measured_friction(time_s: Vector, signal: Vector, noise: float, turn: Expect
     sampling = _Sampling.of((len(time_s) - 1) / float(time_s[-1] - time_s[0]), turn)
     early_s, late_s = (part * turn.turn_s for part in TURN_WITHIN)
     spacing_s = 1 / sampling.rate_Hz
-    grid = np.arange(early_s - (sampling.curve + sampling.gap) * spacing_s, late_s + GAP_S + LINE_S, spacing_s)
+    around, after_s = sampling.curve + 3 * sampling.gap, (sampling.line + 3 * sampling.gap) * spacing_s
+    grid = np.arange(early_s - around * spacing_s, late_s + after_s, spacing_s)
     signal = np.interp(grid, time_s, signal)
     place = _turn_place(signal, sampling)
     before, after = _before(signal, place, sampling), _after(signal, place, sampling)
@@ -96,7 +98,9 @@ def measured_friction(time_s: Vector, signal: Vector, noise: float, turn: Expect
 
 def friction_uncertainty_N(noise_m_s2: float, rate_Hz: float, enclosure_kg: float, magnet_kg: float) -> float:  # noqa: N802 - the unit ends the name
     """What a sensor's noise leaves uncertain of a friction in a firm hand, where it is known least."""
-    turn = ExpectedTurn(turn_s=1.0, free_s=1.0, enclosure_kg=enclosure_kg, magnet_kg=magnet_kg, pull_N=0.0)
+    turn = ExpectedTurn(
+        turn_s=1.0, free_s=1.0, enclosure_kg=enclosure_kg, magnet_kg=magnet_kg, pull_N=0.0, friction_N=1.0
+    )
     sampling = _Sampling.of(rate_Hz, turn)
     still, place = np.zeros(2 * (sampling.curve + sampling.gap)), sampling.curve + sampling.gap + 0.5
     edges = _before(still, place, sampling), _after(still, place, sampling)
@@ -164,11 +168,12 @@ def _sum(before: _Edge, before_kg: float, after: _Edge, after_kg: float, noise: 
 
 def _turn_place(signal: Vector, sampling: _Sampling) -> float:
     """Where the step is, in samples: where two straight lines leap, and how far the samples there have gone by then."""
-    line, gap, skipped = sampling.line, sampling.gap, max(0, sampling.curve - sampling.line)
+    line, gap = sampling.line, sampling.gap
+    skipped = sampling.curve + 2 * gap - line
     away, inside = gap + np.arange(line), np.arange(1 - gap, gap)
     at_turn = np.linalg.pinv(np.vander(away, 2))[-1]
     weights = np.concatenate([-at_turn[::-1], np.zeros(len(inside)), at_turn])
-    leaps = np.correlate(signal[skipped:], weights, "valid")
+    leaps = np.correlate(signal[skipped : len(signal) - 2 * gap], weights, "valid")
     at, leap = skipped + line + gap - 1 + int(leaps.argmax()), float(leaps.max())
     if leap <= 0:
         return float(at)

@@ -51,8 +51,12 @@ SCALE_SHOTS = 4
 """So many peaks tell the scale of the sensor; a friction is not learnt from before, as it goes with the scale."""
 START_SHOTS = 10
 """After so many shots a method's mean is first held against the model."""
-MODEL_SPREAD = 0.02
-"""Assumed, of friction beside the peak: the model's goes by 1.3 % (SD) with hands that differ by a quarter."""
+MODEL_SPREAD, MODEL_SPREAD_N = 0.02, 0.008
+"""Assumed, of friction beside the peak, as a part and in N: with hands that differ by a quarter the model's goes by
+1.4 % (SD) where friction is much, and by 0.007 N where it is little."""
+_FEW = 3
+"""Of so few shots a level is not sure: none is taken for a change, and it is learnt anew if more than taught it lie
+outside."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,13 +81,16 @@ def _none() -> Vector:
 class DeliveryLevel:
     """What a run's shots of a method came to so far, of one quantity; as parts of what is expected.
 
-    For each shot since which there may have been a change up: how far the level then lies from `mean`, and the
-    logarithms of the likelihood ratios of a change up, and of one down, where that lies on the other side.
+    `taught`: by so many shots; `outside`: so many lay outside since. For each shot since which there may have been a
+    change up: how far the level then lies from `mean`, and the logarithms of the likelihood ratios of a change up, and
+    of one down, where that lies on the other side.
     """
 
     spread: DeliverySpread
     mean: float = 1.0
     variance: float
+    taught: int = 0
+    outside: int = 0
     offsets: Vector = field(default_factory=_none)
     ups: Vector = field(default_factory=_none)
     downs: Vector = field(default_factory=_none)
@@ -98,10 +105,12 @@ def after_shot(level: DeliveryLevel, part: float, part_u: float) -> tuple[Delive
     """The level after a shot, and its mark. `part`, `part_u`: measured over expected, with its uncertainty."""
     variance, off = level.variance + level.spread.within**2 + part_u**2, part - level.mean
     if abs(off) > Z_LIMIT * math.sqrt(variance):
-        return level, "outside"
-    shifts = SLIP + np.append(level.offsets, 0.0)
-    ups = np.append(level.ups, 0.0) + (off * shifts - shifts**2 / 2) / variance
-    downs = np.append(level.downs, 0.0) + (-off * shifts - shifts**2 / 2) / variance
+        outside = replace(level, outside=level.outside + 1)
+        return (DeliveryLevel.before(level.spread) if level.taught < outside.outside <= _FEW else outside), "outside"
+    since_now = [0.0] if level.taught >= _FEW else []
+    shifts = SLIP + np.append(level.offsets, since_now)
+    ups = np.append(level.ups, since_now) + (off * shifts - shifts**2 / 2) / variance
+    downs = np.append(level.downs, since_now) + (-off * shifts - shifts**2 / 2) / variance
     if np.logaddexp.reduce(np.concatenate([ups, downs])) - math.log(2) >= SUM_LIMIT:
         return _slipped(level, shifts - SLIP, ups, downs), "slipped"
     gain = level.variance / variance
@@ -109,6 +118,8 @@ def after_shot(level: DeliveryLevel, part: float, part_u: float) -> tuple[Delive
         level,
         mean=level.mean + gain * off,
         variance=(1 - gain) * level.variance,
+        taught=level.taught + 1,
+        outside=0,
         offsets=shifts - SLIP - gain * shifts,
         ups=ups,
         downs=downs,
@@ -134,13 +145,16 @@ class StartLevel:
     said: bool = False
 
 
-def after_start(level: StartLevel, part: float, part_u: float) -> tuple[StartLevel, DeliveryMark]:
-    """The mean with one more shot, and its mark. `part`: friction over peak, both as parts of what is expected."""
+def after_start(level: StartLevel, part: float, part_u: float, model_u: float) -> tuple[StartLevel, DeliveryMark]:
+    """The mean with one more shot, and its mark. `part`: friction beside the peak, as a part of what is expected.
+
+    `model_u`: to what that is known, in every hand.
+    """
     one, shots = 1 / (FRICTION_SPREAD.within**2 + part_u**2), level.shots + 1
     weight = level.weight + one
     mean = level.mean + (part - level.mean) * one / weight
     looks = not level.said and shots % START_SHOTS == 0 and (shots // START_SHOTS).bit_count() == 1
-    far = looks and abs(mean - 1) > start_limit(shots) * math.hypot(MODEL_SPREAD, weight**-0.5)
+    far = looks and abs(mean - 1) > start_limit(shots) * math.hypot(model_u, weight**-0.5)
     return StartLevel(shots=shots, mean=mean, weight=weight, said=level.said or far), "slipped" if far else ""
 
 
@@ -204,7 +218,8 @@ def _judged_friction(
     found = [peak, ShotVerdict(mark=mark, quantity="friction", change=part / levels.friction.mean - 1)]
     levels = replace(levels, friction=friction if known else levels.friction)
     if not any(one.mark for one in found):
-        start, mark = after_start(levels.start, *so_far)
+        model_u = math.hypot(MODEL_SPREAD, MODEL_SPREAD_N / shot.usual_N)
+        start, mark = after_start(levels.start, so_far[0], so_far[1], model_u)
         found.append(ShotVerdict(mark=mark, quantity="friction beside the peak", change=start.mean - 1))
         levels = replace(levels, start=start)
     return levels, next((one for one in found if one.mark), ShotVerdict())
