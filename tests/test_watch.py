@@ -417,6 +417,12 @@ class Outline(HTMLParser):
         return {inner for outer, inner in self.within if outer in tags}
 
 
+def test_a_file_whose_name_is_no_text_is_no_end_of_the_page() -> None:
+    """A name in another encoding is read with letters that no page can have."""
+    parts = ("\udcff",) * len(PAGE_PARTS)
+    assert whole_page(parts, "\udcff").decode().count("?") >= len(PAGE_PARTS)
+
+
 def test_lists_hold_items_and_lines_of_text_hold_no_blocks(journal: Path, whole: bytes) -> None:
     for data in (None, whole, part(whole, "ask", 5)):
         if data is not None:

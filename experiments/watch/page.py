@@ -45,7 +45,9 @@ _MOOD: dict[WatchedState, str] = {"running": "good", "finished": "good", "paused
 def whole_page(parts: tuple[str, ...], folder: str) -> bytes:
     """The page with its parts, as it is before anything changes."""
     template = Template(static("page.html").decode())
-    return template.substitute(dict(zip(PAGE_PARTS, parts, strict=True)), folder=escape(folder)).encode()
+    return template.substitute(dict(zip(PAGE_PARTS, parts, strict=True)), folder=escape(folder)).encode(
+        errors="replace"
+    )
 
 
 def static(name: str) -> bytes:

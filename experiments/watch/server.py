@@ -170,7 +170,7 @@ class _Handler(BaseHTTPRequestHandler):
             number, parts = self.server.reader.after(number, ALIVE_S)
             news = [(name, part) for name, part, old in zip(PAGE_PARTS, parts, sent, strict=True) if part != old]
             text = "".join(f"event: {name}\ndata: {part}\n\n" for name, part in news)
-            self.wfile.write(text.encode() or b": alive\n\n")
+            self.wfile.write(text.encode(errors="replace") or b": alive\n\n")
             sent = parts
 
     def _no_method(self) -> None:
