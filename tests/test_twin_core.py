@@ -1,9 +1,12 @@
 """The gun's core, as `PROTOCOL.md` says it: by hand, in frames, in its states, and left alone."""
 
+from pathlib import Path
+
 import pytest
 
 from device.twin.core import Core
 from device.twin.machine import REFUSED, DriveEvent
+from device.twin.twin import Pty
 from device.wire.records import Frame, ShotRecord, decode, encode, following, refusal_in
 from tests.twin_hosts import PULSE, READY, Hand, Strict
 
@@ -243,3 +246,13 @@ def test_what_is_beyond_a_range_is_refused_and_changes_nothing(strict, text):
 )
 def test_what_is_no_command_is_refused_by_its_number(strict, text, code):
     assert [refusal_in(answer)[0] for answer in strict.say(text)] == [code]
+
+
+def test_a_file_where_the_link_is_to_be_is_refused_and_kept(tmp_path: Path) -> None:
+    precious = tmp_path / "journal.jsonl"
+    precious.write_bytes(b"kept")
+    line = Pty(precious)
+    with pytest.raises(FileExistsError, match="is no link"):
+        line.plug()
+    line.unplug()
+    assert precious.read_bytes() == b"kept"

@@ -116,9 +116,11 @@ class Pty:
         self.address = ""
 
     def plug(self) -> None:
-        """A new pseudo-terminal. `OSError`: the link's place is taken by a folder, or nothing can be made there."""
+        """A new pseudo-terminal. `OSError`: something else is where the link is to be, or nothing can be made there."""
         if self._ends is not None:
             return
+        if self._link is not None and self._link.exists() and not self._link.is_symlink():
+            raise FileExistsError(f"{self._link}: is no link, and would be lost")
         import tty  # noqa: PLC0415 - not on every system
 
         gun, host = os.openpty()
@@ -135,8 +137,8 @@ class Pty:
         """Both ends are closed: the host's descriptor is dead, its path leads nowhere."""
         if self._ends is None:
             return
-        if self._link is not None:
-            self._link.unlink(missing_ok=True)
+        if self._link is not None and self._link.is_symlink():
+            self._link.unlink()
         for end in self._ends:
             os.close(end)
         self._ends = None
