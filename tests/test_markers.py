@@ -370,6 +370,18 @@ def test_a_damaged_journal_is_named_once_and_other_runs_go_on(journal: Path, who
     assert "kind must be one of" in line
 
 
+def test_one_bad_entry_is_named_and_silences_no_other_run(journal: Path, whole: bytes) -> None:
+    said, results = list[str](), journal.parents[1]
+    (results / "sub-P00").symlink_to("sub-P00")
+    other = journal.with_name(NAME.replace("direction", "other"))
+    other.symlink_to(other.name)
+    feed = MarkerFeed(results, said.append)
+    journal.write_bytes(forged(now(entries_of(whole))[:2]))
+    assert names(feed) == ["begin"]
+    feed.find()
+    assert [line.partition(":")[0] for line in said] == [str(results / "sub-P00"), str(other)]
+
+
 def test_a_folder_that_cannot_be_read_is_said_once(tmp_path: Path) -> None:
     said, place = list[str](), tmp_path / "file"
     place.touch()

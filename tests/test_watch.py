@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -18,11 +18,11 @@ from pathlib import Path
 import pytest
 
 from device.words import RecoilError
-from experiments.record import storage
+from experiments.record import storage, tail
 from experiments.record.journal import JournalError
 from experiments.record.tail import JournalTail
 from experiments.watch import server as serving
-from experiments.watch.folder import FolderWatch, Reader, watched_folder
+from experiments.watch.folder import FolderWatch, Reader, Watched, watched_folder
 from experiments.watch.page import PAGE_PARTS, page_parts, whole_page
 from experiments.watch.runs import RunRow
 from experiments.watch.server import WatchServer
@@ -314,7 +314,8 @@ def test_a_journal_under_another_name_and_what_is_no_journal_are_said(journal: P
     assert seen is not None
     assert [one.state for one in seen.rows] == ["damaged", "damaged"]
     assert "was it renamed?" in seen.rows[1].problem
-    assert "sub-P02_task-direction_journal.jsonl: is no file, though it is named like a journal" in seen.problem
+    (problem,) = seen.problems
+    assert "sub-P02_task-direction_journal.jsonl: is no file, though it is named like a journal" in problem
     assert "<script>" not in page_parts(seen)[1]
 
 
@@ -325,11 +326,94 @@ def test_a_folder_that_goes_away_is_said_and_comes_back(journal: Path, whole: by
     away = results_of(journal).rename(results_of(journal).with_name("away"))
     seen = watch.look()
     assert seen is not None
-    assert "cannot be read" in seen.problem
+    assert "cannot be read" in " ".join(seen.problems)
+    assert [one.state for one in seen.rows] == ["gone"]
     away.rename(results_of(journal))
     seen = watch.look()
     assert seen is not None
-    assert (seen.problem, len(seen.rows)) == ("", 1)
+    assert (seen.problems, [one.state for one in seen.rows]) == ((), ["finished"])
+
+
+def loop(path: Path) -> None:
+    path.symlink_to(path.name)
+
+
+def device_without_end(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def no_file_at_all(path: Path) -> None:
+    path.symlink_to("nothing")
+
+
+@pytest.mark.parametrize("bad", [loop, os.mkfifo, device_without_end, no_file_at_all])
+@pytest.mark.parametrize("name", ["sub-P00", f"sub-P01/{NAME.replace('direction', 'other')}"])
+def test_one_bad_entry_is_named_and_hides_no_other_run(
+    bad: Callable[[Path], None], name: str, journal: Path, whole: bytes
+) -> None:
+    watch = FolderWatch(results_of(journal))
+    bad(results_of(journal) / name)
+    seen = watch.look()
+    assert seen is not None
+    if "/" in name or bad in (loop, no_file_at_all):
+        assert [results_of(journal) / name] == [Path(problem.partition(": ")[0]) for problem in seen.problems]
+        assert "no run is to be seen" in page_parts(seen)[0]
+    journal.write_bytes(whole)
+    assert [(one.name, one.state) for one in rows(watch)] == [("P01", "finished")]
+
+
+@pytest.mark.parametrize("bad", [loop, os.mkfifo, device_without_end, no_file_at_all])
+def test_a_journal_in_whose_place_there_is_none_any_more_is_never_read(
+    bad: Callable[[Path], None], journal: Path, whole: bytes
+) -> None:
+    journal.write_bytes(part(whole, "ask", 5))
+    watch = FolderWatch(results_of(journal))
+    before = rows(watch)
+    journal.unlink()
+    bad(journal)
+    (shown,) = rows(watch)
+    assert (shown.name, shown.state, shown.done) == ("P01", "damaged", before[0].done)
+    assert watch.look() is None  # said once, not at every look
+
+
+def test_what_is_longer_than_any_record_is_read_no_further(journal: Path, whole: bytes) -> None:
+    journal.write_bytes(part(whole, "ask", 5))
+    watch = FolderWatch(results_of(journal))
+    rows(watch)
+    os.truncate(journal, 1 << 40)  # a hole: a terabyte that takes no place
+    assert "is longer than any record" in rows(watch)[0].problem
+
+
+def test_a_journal_is_read_a_look_at_a_time(journal: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tail, "LOOK_BYTES", max(map(len, lines_of(whole))))
+    journal.write_bytes(whole)
+    watch, states = FolderWatch(results_of(journal)), list[str]()
+    for _ in range(len(lines_of(whole))):
+        watch.look()
+        states += [run.row(datetime.now(UTC)).state for run in watch.runs]
+        if states[-1] == "finished":
+            break
+    assert states.count("finished") == 1
+    assert len(states) > 2
+    assert "damaged" not in states
+
+
+def test_a_reader_that_breaks_off_ends_the_page_with_one_message(journal: Path, whole: bytes) -> None:
+    def made(seen: Watched) -> tuple[str, ...]:
+        if seen.rows:
+            raise MemoryError("no memory for a page")
+        return page_parts(seen)
+
+    reader = Reader(FolderWatch(results_of(journal)), made)
+    with WatchServer(reader, 0, "results") as server:
+        reader.start()
+        journal.write_bytes(whole)
+        try:
+            with pytest.raises(RecoilError, match="the looking broke off") as caught:
+                server.serve_forever()
+        finally:
+            reader.stop()
+    assert "start `recoil watch` anew" in str(caught.value)
 
 
 def test_nothing_in_the_folder_is_touched_and_a_run_finds_its_journal_free(journal: Path, whole: bytes) -> None:

@@ -361,8 +361,8 @@ def head(path: Path) -> Head | None:
 def journal_bytes(path: Path) -> bytes:
     """The bytes of a journal. `JournalError` if there are none to be had."""
     try:
-        storage.check_file(path)
-        return path.read_bytes()
+        with os.fdopen(storage.open_to_read(path), "rb") as file:
+            return file.read()
     except OSError as error:
         raise JournalError(f"{path}: cannot be read ({error.strerror})") from error
 

@@ -61,11 +61,32 @@ def moved_to(descriptor: int) -> Path | None:
     return path if is_at(descriptor, path) else None
 
 
-def check_file(path: Path) -> None:
-    """`OSError` where there is no file: to open a pipe would wait for ever for somebody to write to it."""
-    mode = path.stat().st_mode
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise OSError(errno.EINVAL, "it is no file", str(path))
+def open_to_read(path: Path) -> int:
+    """A file to be read. `OSError` where there is none: a pipe would be waited for, and a device has no end."""
+    descriptor = os.open(path, _READ)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return descriptor
+    os.close(descriptor)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise OSError(errno.EINVAL, "it is no file", str(path))
+
+
+_READ = os.O_RDONLY
+for _flag in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"):
+    _READ |= getattr(os, _flag, 0)
+
+
+def pieces(path: Path, length: int) -> Iterator[bytes]:
+    """The first bytes of a file, a piece at a time. `OSError` as of `open_to_read`."""
+    with os.fdopen(open_to_read(path), "rb") as file:
+        while length and (piece := file.read(min(length, _PIECE_BYTES))):
+            yield piece
+            length -= len(piece)
+
+
+_PIECE_BYTES = 1 << 20
 
 
 def read_open(descriptor: int, length: int) -> bytes:
@@ -121,8 +142,7 @@ _AGAIN_S = 0.01
 
 def is_held(path: Path) -> bool:
     """Whether somebody holds a file. To find out it is held for a moment, which others who only look do not notice."""
-    check_file(path)
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
+    descriptor = open_to_read(path)
     try:
         return not _locked(descriptor, shared=True)
     finally:

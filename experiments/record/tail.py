@@ -11,7 +11,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.record import storage
 from experiments.record.journal import JournalError, Record, head_of, link_of, record_of
+
+LOOK_BYTES = 1 << 26
+"""So much of a journal is read in one look; no record is longer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,6 +27,8 @@ class News:
 
 
 _NO_NEWS = News()
+_READ_ON = -1
+"""A time that no file has: there is something to be read, though nothing was written."""
 
 
 class JournalTail:
@@ -63,8 +69,10 @@ class JournalTail:
 
     def unchanged(self) -> bool:
         """Whether the bytes that were read stand there still. `OSError`: they cannot be read."""
-        with self.path.open("rb") as file:
-            return hashlib.sha256(file.read(self._length)).digest() == self._digest.digest()
+        digest = hashlib.sha256()
+        for piece in storage.pieces(self.path, self._length):
+            digest.update(piece)
+        return digest.digest() == self._digest.digest()
 
     def check(self) -> None:
         """Have everything read anew at the next look, if it was changed without a trace in size and time."""
@@ -74,18 +82,20 @@ class JournalTail:
             changed = True
         if changed:
             self._begin()
-            self._stamp = None if self._stamp is None else (self._stamp[0], self._stamp[1], -1)
+            self._stamp = None if self._stamp is None else (self._stamp[0], self._stamp[1], _READ_ON)
 
     def _read_on(self) -> News:
-        with self.path.open("rb") as file:
-            os.lseek(file.fileno(), self._length, os.SEEK_SET)
-            data = file.read()
-        whole = data[: data.rfind(b"\n") + 1]
-        self.cut_bytes = len(data) - len(whole)
+        with os.fdopen(storage.open_to_read(self.path), "rb") as file:
+            file.seek(self._length)
+            data = file.read(LOOK_BYTES)
+        whole, more = data[: data.rfind(b"\n") + 1], len(data) == LOOK_BYTES
+        self.cut_bytes = 0 if more else len(data) - len(whole)
         anew = self._count == 0
         try:
+            if more and not whole:
+                raise JournalError(f"{self.path}: line {self._count + 1} is longer than any record; it was changed")
             records = tuple(map(self._next, whole.split(b"\n")[:-1]))
-            self._check_whole()
+            self._check_whole(more=more)
         except JournalError:
             self._begin()
             raise
@@ -108,10 +118,14 @@ class JournalTail:
             raise JournalError(f"{self.path}: line 1: no whole record")
         return head
 
-    def _check_whole(self) -> None:
-        if self._count < self._most:
+    def _check_whole(self, *, more: bool) -> None:
+        """Whether all is there that was; with `more` the next look reads on."""
+        if more and self._stamp is not None:
+            self._stamp = (self._stamp[0], self._length, _READ_ON)
+        if self._count >= self._most:
+            self._most, self._most_link = self._count, self._link
+        elif not more:
             raise JournalError(
                 f"{self.path}: has {self._count} whole records and had {self._most} while it was watched; it was cut, "
                 "so put back a copy"
             )
-        self._most, self._most_link = self._count, self._link

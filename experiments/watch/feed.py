@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from experiments.record.journal import ENDING, Head, JournalError, Record
+from experiments.record import storage
+from experiments.record.journal import Head, JournalError, Record
 from experiments.record.tail import JournalTail
 from experiments.watch.folder import journals_in
 from experiments.watch.markers import Marker, RunMarkers
@@ -29,7 +31,7 @@ class MarkerFeed:
 
     def __init__(self, folder: Path, say: _Say) -> None:
         self._folder, self._say = folder, say
-        self._problem = ""
+        self._problems = set[str]()
         self._known: dict[Path, _Stamp] = dict(self._journals())
         self._runs: dict[Path, FollowedRun] = {}
         self._ended: dict[Path, int] = {}
@@ -53,31 +55,36 @@ class MarkerFeed:
             before = self._known.get(path)
             self._known[path] = stamp
             if path not in self._runs and stamp != before and self._ended.get(path) != stamp[0]:
-                self._runs[path] = FollowedRun(path, _lines_before(path, before, stamp), self._say)
+                self._follow(path, before, stamp)
         now_s = time.monotonic()
         self._next_s = now_s + max(_FIND_S, _SHARE * (now_s - began_s))
 
-    def _journals(self) -> Iterator[tuple[Path, _Stamp]]:
+    def _follow(self, path: Path, before: _Stamp | None, now: _Stamp) -> None:
         try:
-            for entry in journals_in(self._folder):
-                if entry.name.endswith(ENDING) and entry.is_file():
-                    now = Path(entry.path).stat()
-                    yield Path(entry.path), (now.st_ino, now.st_size)
-        except FileNotFoundError:  # not made yet, or moved away just now
-            return
+            self._runs[path] = FollowedRun(path, _lines_before(path, before, now), self._say)
         except OSError as error:
-            problem = f"{error.filename or self._folder}: cannot be read ({error.strerror})"
-            if problem != self._problem:
-                self._problem = problem
-                self._say(problem)
+            self._say_once(f"{path}: cannot be read ({error.strerror}); no markers of this run")
+
+    def _journals(self) -> Iterator[tuple[Path, _Stamp]]:
+        if not os.path.lexists(self._folder):  # not made yet, or moved away just now
+            return
+        found = journals_in(self._folder)
+        for problem in found.problems:
+            self._say_once(problem)
+        for path, now in found.stats.items():
+            yield path, (now.st_ino, now.st_size)
+
+    def _say_once(self, problem: str) -> None:
+        if problem not in self._problems:
+            self._problems.add(problem)
+            self._say(problem)
 
 
 def _lines_before(path: Path, before: _Stamp | None, now: _Stamp) -> int:
     """How many records a journal had when it was first seen; none, if that was another file by its name."""
     if before is None or before[0] != now[0]:
         return 0
-    with path.open("rb") as file:
-        return file.read(before[1]).count(b"\n")
+    return sum(piece.count(b"\n") for piece in storage.pieces(path, before[1]))
 
 
 class FollowedRun:
@@ -102,8 +109,8 @@ class FollowedRun:
                 self.over = record.kind == "finished"
         except JournalError as error:
             self._end(str(error))
-        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            self._end(f"{self._path}: makes no run ({error}); it was changed")
+        except Exception as error:  # noqa: BLE001 - whatever one journal does, the others go on
+            self._end(f"{self._path}: makes no run ({str(error) or type(error).__name__}); it was changed")
         return markers
 
     def _end(self, why: str) -> None:

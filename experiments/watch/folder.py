@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import stat
 import threading
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -29,6 +30,7 @@ class Watched:
     """What a look at the folder found: each run, by participant and experiment, and what there is to say beside them.
 
     `set_aside` and `unread`: how many journals were set aside, which are not shown, and how many are still to be read.
+    `problems`: what cannot be read, or is no file.
     """
 
     folder: Path
@@ -36,7 +38,7 @@ class Watched:
     rows: tuple[RunRow, ...] = ()
     set_aside: int = 0
     unread: int = 0
-    problem: str = ""
+    problems: tuple[str, ...] = ()
 
 
 def watched_folder(folder: Path) -> Path:
@@ -53,7 +55,7 @@ class FolderWatch:
         self.folder = folder
         self._runs: dict[Path, WatchedRun] = {}
         self._unread: dict[Path, float] = {}
-        self._set_aside, self._problem, self._no_files = 0, "", ""
+        self._found = JournalFiles()
         self._asked_s = self._checked_s = self._told_s = -1e9
 
     def look(self) -> Watched | None:
@@ -88,35 +90,25 @@ class FolderWatch:
             folder=self.folder,
             utc=utc,
             rows=tuple(run.row(utc) for run in self.runs),
-            set_aside=self._set_aside,
+            set_aside=self._found.set_aside,
             unread=len(self._unread),
-            problem=self._problem or self._no_files,
+            problems=self._found.problems,
         )
 
     def _find(self) -> bool:
         """Know the journals that are there now; whether they are others than before."""
         before = self._there()
-        found, self._set_aside, self._problem, self._no_files = dict[Path, float](), 0, "", ""
-        try:
-            for entry in journals_in(self.folder):
-                if not entry.is_file():
-                    self._no_files = f"{entry.path}: is no file, though it is named like a journal; it is left alone"
-                elif entry.name.endswith(ENDING):
-                    found[Path(entry.path)] = entry.stat().st_mtime
-                else:
-                    self._set_aside += 1
-        except OSError as error:
-            self._problem = f"{error.filename or self.folder}: cannot be read ({error.strerror})"
-        if not self._problem:
-            for path, run in self._runs.items():
-                run.gone = path not in found
-            self._unread = {path: at_s for path, at_s in found.items() if path not in self._runs}
+        self._found = journals_in(self.folder)
+        stats = self._found.stats
+        for path, run in self._runs.items():
+            run.gone = path not in stats and _is_gone(path)
+        self._unread = {path: stat.st_mtime for path, stat in stats.items() if path not in self._runs}
         return before != self._there()
 
-    def _there(self) -> tuple[int, str, str, int, int]:
+    def _there(self) -> tuple[int, tuple[str, ...], int, int]:
         """What a look at the folder alone can change."""
         gone = sum(run.gone for run in self._runs.values())
-        return self._set_aside, self._problem, self._no_files, len(self._runs) + len(self._unread), gone
+        return self._found.set_aside, self._found.problems, len(self._runs) + len(self._unread), gone
 
     def _read_unread(self, until_s: float) -> bool:
         """Read journals for the first time, the youngest first; whether there were any."""
@@ -130,16 +122,67 @@ class FolderWatch:
         return bool(waiting)
 
 
-def journals_in(folder: Path) -> Iterator[os.DirEntry[str]]:
-    """What is named as the files are that runs write their records to, those that were set aside too."""
-    with os.scandir(folder) as people:
-        for person in people:
-            if person.name.startswith("sub-") and person.is_dir():
-                with os.scandir(person) as files:
-                    yield from (one for one in files if _STEM in one.name and one.name.endswith(".jsonl"))
+def _is_gone(path: Path) -> bool:
+    """Whether there is nothing by that name, as far as one may look."""
+    try:
+        path.lstat()
+    except OSError as error:
+        return isinstance(error, FileNotFoundError | NotADirectoryError)
+    return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JournalFiles:
+    """The journals of a folder, how many more were set aside, and what in it cannot be read, one sentence each."""
+
+    stats: Mapping[Path, os.stat_result] = field(default_factory=dict)
+    set_aside: int = 0
+    problems: tuple[str, ...] = ()
+
+
+def journals_in(folder: Path) -> JournalFiles:
+    """What is named as the files are that runs write their records to. What cannot be read hides nothing else."""
+    stats, set_aside, problems = dict[Path, os.stat_result](), 0, list[str]()
+    for person in _listed(folder, problems):
+        found = _stat(person, problems) if person.name.startswith("sub-") else None
+        for one in _listed(Path(person), problems) if found and stat.S_ISDIR(found.st_mode) else ():
+            named = _STEM in one.name and one.name.endswith(".jsonl")
+            if not (named and (found := _stat(one, problems))):
+                continue
+            if not stat.S_ISREG(found.st_mode):
+                problems.append(f"{one.path}: is no file, though it is named like a journal; it is left alone")
+            elif one.name.endswith(ENDING):
+                stats[Path(one)] = found
+            else:
+                set_aside += 1
+    return JournalFiles(stats=stats, set_aside=set_aside, problems=tuple(problems))
 
 
 _STEM = ENDING.removesuffix(".jsonl")
+
+
+def _listed(folder: Path, problems: list[str]) -> list[os.DirEntry[str]]:
+    """What is in a folder."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entries, key=lambda entry: entry.name)
+    except OSError as error:
+        problems.append(f"{folder}: cannot be read ({error.strerror}); what is in it is not shown")
+        return []
+
+
+def _stat(entry: os.DirEntry[str], problems: list[str]) -> os.stat_result | None:
+    """What a name stands for; `None` if that cannot be told, or it was moved away just now."""
+    try:
+        return entry.stat()
+    except OSError as error:
+        if entry.is_symlink() or not isinstance(error, FileNotFoundError):
+            problems.append(f"{entry.path}: cannot be read ({error.strerror}); it is left alone")
+        return None
+
+
+_LEAVE_S = 2.0
+"""How long a look that is under way is waited for."""
 
 
 class Reader:
@@ -154,6 +197,8 @@ class Reader:
         self._parts: tuple[str, ...] = ()
         self._number = 0
         self._leaves = threading.Event()
+        self.failure: Exception | None = None
+        """What the looking broke off with; nothing new comes any more."""
         self._thread = threading.Thread(target=self._look_on, daemon=True, name="watch")
 
     def start(self) -> None:
@@ -165,7 +210,7 @@ class Reader:
         """Look no more, and let go of everybody who waits."""
         self._leaves.set()
         if self._thread.ident is not None:
-            self._thread.join()
+            self._thread.join(_LEAVE_S)
         with self._news:
             self._news.notify_all()
 
@@ -185,7 +230,11 @@ class Reader:
         took_s = 0.0
         while not self._leaves.wait(max(NEXT_LOOK_S, SHARE * took_s)):
             began_s = time.monotonic()
-            self._look()
+            try:
+                self._look()
+            except Exception as error:  # noqa: BLE001 - raised where the page is served
+                self.failure = error
+                self._leaves.set()
             took_s = time.monotonic() - began_s
 
     def _look(self) -> None:

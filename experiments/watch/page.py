@@ -15,6 +15,8 @@ from experiments.watch.runs import RunRow, SyncTimes, WatchedState, age_s
 
 PAGE_PARTS = ("summary", "open", "finished")
 """The parts of the page that change, by their ids."""
+PROBLEMS_SHOWN = 5
+"""So many things that cannot be read are named on the page."""
 
 _SIGNS: dict[WatchedState, str] = {
     "running": "▶",
@@ -68,11 +70,14 @@ def page_parts(seen: Watched) -> tuple[str, ...]:
 
 def _summary(seen: Watched) -> str:
     counts = [(word, sum(row.state == word for row in seen.rows)) for word in _SIGNS]
-    said = [f"{count} {word}" for word, count in counts if count] or ["no run has begun here"]
+    none = "no run is to be seen" if seen.problems else "no run has begun here"
+    said = [f"{count} {word}" for word, count in counts if count] or [none]
     said += [f"{seen.unread} still to be read"] * bool(seen.unread)
     said += [f"{seen.set_aside} set aside, not shown"] * bool(seen.set_aside)
-    problem = f'<p class="problem">{escape(seen.problem)}</p>' if seen.problem else ""
-    return f"<p>{escape(' · '.join(said))}</p>{problem}"
+    told, more = seen.problems[:PROBLEMS_SHOWN], len(seen.problems) - PROBLEMS_SHOWN
+    told += (f"and {more} more of this kind",) * (more > 0)
+    problems = "".join(f'<p class="problem">{escape(problem)}</p>' for problem in told)
+    return f"<p>{escape(' · '.join(said))}</p>{problems}"
 
 
 def _card(row: RunRow, now: datetime) -> str:

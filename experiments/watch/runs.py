@@ -313,16 +313,21 @@ class WatchedRun:
         if self.gone:
             return False
         try:
-            news = self._tail.look()
-            if not (news.anew or news.records):
-                return False
-            if news.anew:
-                self._so_far, self._finished, self._problem = None, None, ""
-            self._add(news.records)
+            return self._take_news()
         except JournalError as error:
-            self._problem = str(error)
-        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            self._problem = f"{self.path}: makes no run ({error}); it was changed"
+            problem = str(error)
+        except Exception as error:  # noqa: BLE001 - whatever one journal does, the others are shown
+            problem = f"{self.path}: makes no run ({str(error) or type(error).__name__}); it was changed"
+        before, self._problem, self._row = self._problem, problem, None
+        return problem != before
+
+    def _take_news(self) -> bool:
+        news = self._tail.look()
+        if not (news.anew or news.records):
+            return False
+        if news.anew:
+            self._so_far, self._finished, self._problem = None, None, ""
+        self._add(news.records)
         self._row = None
         return True
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+from device.words import RecoilError
 from experiments.study.folders import PlaceError
 from experiments.watch.folder import FolderWatch, Reader, watched_folder
 from experiments.watch.page import PAGE_PARTS, page_parts, static, whole_page
@@ -78,6 +79,15 @@ class WatchServer(ThreadingHTTPServer):
         """Where it is."""
         port = int(self.server_address[1])
         return WatchPage(address=f"http://{HOST}:{port}/{self.token}/", port=port)
+
+    def service_actions(self) -> None:
+        """End with the reader, where it broke off. `RecoilError` says with what."""
+        error = self.reader.failure
+        if error is not None:
+            raise RecoilError(
+                f"{self.name}: the looking broke off ({type(error).__name__}: {error}); no run is touched by that: "
+                "start `recoil watch` anew"
+            ) from error
 
     def process_request(self, request: object, client_address: object) -> None:
         """Serve a connection in a thread of its own, if there is a place."""
@@ -189,7 +199,7 @@ class _Handler(BaseHTTPRequestHandler):
 def serve_page(results: Path, port: int, tell: Callable[[WatchPage], None]) -> None:
     """Serve the page of a results folder until interrupted. `tell` is called once it can be opened.
 
-    `PlaceError`: there is no such folder, or the port cannot be used.
+    `PlaceError`: there is no such folder, or the port cannot be used. `RecoilError`: it broke off.
     """
     folder = watched_folder(results)
     if hasattr(os, "nice"):
