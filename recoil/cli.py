@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 import recoil
-from analysis.report.streams import forgive_streams
+from analysis.report.streams import forgive_streams, keep_results_apart
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.words import RecoilError, few_of_each
 from recoil.commands import archives, guns, numbers, predictions, sessions
@@ -89,6 +89,8 @@ def main() -> None:
     """Run a command. Whatever goes wrong is one message on stderr and an exit code, never a traceback."""
     gc.set_threshold(1_000_000, 20, 50)  # a report's imports make 350,000 objects and drop none: not looked through
     forgive_streams()
+    if "--json" in sys.argv[1:]:
+        keep_results_apart()
     for name, value in _OF_LIBRARIES.items():
         os.environ.setdefault(name, value)
     os.umask(0o077)  # what is written here is about people: for its owner alone

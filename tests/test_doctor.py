@@ -54,6 +54,7 @@ from experiments.doctor.figures import (
     MarkerStream,
     Percentiles,
     PsychoPyStage,
+    SensorFigures,
     Sound,
     Ticks,
     percentile,
@@ -193,6 +194,7 @@ def test_latencies_of_several_journals_are_counted_together() -> None:
 
 # verdicts
 
+SENSOR = SensorFigures(sensor="csv:x", rate_Hz=3200.0, noise_m_s2=0.05, shots_to_see=1.0)
 STREAMS = MarkerStream(version="1.18", sent=2, to_reader_ms=[0.1, 0.2])
 MACHINE = Machine(system="Linux", python="3.11.7", cores=2, versions={"numpy": "2.4", "psychopy": "2026.2.5"})
 TICKS = Ticks(resolution_s=1e-9, smallest_step_s=4e-8, oversleep_ms=FAST)
@@ -224,6 +226,10 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_link(replace(LINK, state="armed"), 0.010), "fails", "switch off"),
         (verdicts.of_link(replace(LINK, fault="coil open"), 0.010), "fails", "switch off"),
         (verdicts.of_link_failure("no answer"), "fails", "cable"),
+        (verdicts.of_failure("gun", "gun plug-in bad: its import failed"), "fails", "uninstall it"),
+        (verdicts.of_sensor(SENSOR), "good", ""),
+        (verdicts.of_sensor(replace(SENSOR, shots_to_see=3.1)), "warning", "less noise"),
+        (verdicts.of_sensor(replace(SENSOR, noise_m_s2=0.0)), "fails", "its value never changes"),
         (verdicts.of_adapters([]), "not there", "nothing"),
         (verdicts.of_adapters([ADAPTER]), "good", ""),
         (

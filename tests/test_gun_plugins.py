@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -30,6 +31,7 @@ from experiments.record.journal import Record, read_journal
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session import events
 from experiments.session.states import EMERGENCY
+from tests.conftest import RECOIL
 from tests.firmware import emulated
 from tests.gun_plugins import ROOT, install, install_sound_card
 from tests.twins import a_shot, a_twin
@@ -163,6 +165,9 @@ def test_a_plug_in_that_hangs_at_import_is_refused_by_name(tmp_path, monkeypatch
     [
         ("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n", "its import was killed by signal 9"),
         ("import sys\nsys.exit('no card')\n", "its import failed: no card"),
+        ("import os\nos._exit(0)\n", "its import ended the process: it said nothing"),
+        ("import sys\nprint('imported')\nsys.exit()\n", "its import ended the process: imported"),
+        ("raise OSError('no\\ncard')\n", "its import failed: OSError: no card"),
         ("1 / 0\n", "its import failed: ZeroDivisionError: division by zero"),
         ("", "its import failed: AttributeError: .*open_gun"),
         ("open_gun = 3\n", "its import failed: TypeError: the entry point is 3; it must be a function of"),
@@ -204,9 +209,31 @@ def test_no_plug_in_takes_the_name_of_a_gun_of_ours_and_those_that_are_there_are
 ):
     install(monkeypatch, tmp_path, "1 / 0\n", name="simulated", module="false_gun")
     assert open_gun("simulated").identify().model == "simulated"
-    assert "simulated" not in door.plugin_names()
+    assert "simulated" not in door.installed_plugins().names
     with pytest.raises(ValueError, match=r"address is 'usb'; .*plug-in that is installed beside Recoil .sound-card."):
         open_gun("usb:1")
+
+
+@pytest.mark.parametrize(
+    ("broken", "said"),
+    [
+        (b"[recoil.guns]\nother\n", "broken: its entry_points.txt cannot be read (.+): mend or uninstall it"),
+        (b"[recoil.guns]\n\xff = x:y\n", "broken: its entry_points.txt cannot be read (.+): mend or uninstall it"),
+        (b"[recoil.guns]\nbad = no such syntax!!\n", None),
+    ],
+)
+def test_broken_entry_points_are_named_with_their_package_and_lock_out_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sound_card: str, broken: bytes, said: str | None
+) -> None:
+    install(monkeypatch, tmp_path, "", name="x", module="broken_gun", package="broken")
+    (tmp_path / "broken-0.1.0.dist-info" / "entry_points.txt").write_bytes(broken)
+    open_gun(sound_card).close()
+    if said is None:
+        with pytest.raises(PluginError, match="gun plug-in bad: the package broken gives it as `bad = no such syntax"):
+            open_gun("bad:")
+    else:
+        with pytest.raises(ValueError, match=rf"installed beside Recoil \(sound-card\); {said}"):
+            open_gun("other:")
 
 
 def test_a_plug_in_that_never_opens_is_refused(tmp_path, monkeypatch):
@@ -217,6 +244,38 @@ def test_a_plug_in_that_never_opens_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(door, "PLUGIN_OPEN_S", 0.05)
     with pytest.raises(PluginError, match=r"gun plug-in slow did not open '': TimeoutError: no answer within 0.05 s"):
         open_gun("slow")
+
+
+CHATTY = """
+import os
+from device.simulated import SimulatedGun
+print("said at import")
+def open_gun(address, methods, clock):
+    os.write(1, b"written by a library\\n")
+    print("said when it was opened\\x1b[2J")
+    return SimulatedGun(methods, clock)
+"""
+
+
+@pytest.mark.slow
+def test_what_a_plug_in_prints_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, tmp_path, CHATTY, name="chatty", module="chatty_gun")
+    words = ["run", "direction", "--practice", "--screen", "synthetic", "--participant", "P01", "--json"]
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    done = subprocess.run(
+        [RECOIL, *words, "--gun", "chatty:"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout).keys() == {"journal", "table"}
+    for said in ("said at import", "written by a library", "said when it was opened"):
+        assert said in done.stderr
+
+
+def test_a_gun_that_does_not_open_is_said_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, tmp_path, "1 / 0\n", name="bad", module="bad_gun")
+    (only,) = conformance(rig_at("bad:"))
+    assert (only.check, only.kept) == ("opening", False)
+    assert "ZeroDivisionError" in only.said
 
 
 # what the guard believes, and what it lets through

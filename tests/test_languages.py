@@ -3,6 +3,7 @@
 import ast
 import io
 import json
+import os
 import re
 import runpy
 from dataclasses import fields, replace
@@ -204,6 +205,51 @@ def test_chinese_is_not_checked_and_says_so():
     with pytest.raises(ConfigError, match=r"no native speaker has checked it .* add --unchecked"):
         check_allowed(chinese, unchecked=False)
     check_allowed(chinese, unchecked=True)
+
+
+@pytest.mark.parametrize(
+    "nobody",
+    [
+        "",
+        "nobody",
+        "Nobody",
+        "nobody yet",
+        "no one",
+        "none",
+        "-",
+        "?",
+        "...",
+        "X",
+        "TODO",
+        "to do: ask",
+        "TBD",
+        "n/a",
+        "FULL NAME <EMAIL@ADDRESS>",
+        "<your name>",
+        "Not checked",
+    ],
+)
+def test_what_is_no_name_of_a_checker_is_none(tmp_path, nobody):
+    write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG] | {CHECKED_BY: nobody})
+    with pytest.raises(ConfigError, match="no native speaker has checked it"):
+        check_allowed(language(LONG, tmp_path), unchecked=False)
+
+
+@pytest.mark.parametrize("name", ["王伟", "Nona Nil", "Noneli", "J. Todorov", "two colleagues in Graz"])
+def test_a_checkers_name_is_one_in_any_writing(tmp_path, name):
+    write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG] | {CHECKED_BY: name})
+    assert language(LONG, tmp_path).checked_by == name
+
+
+def test_a_catalogue_that_is_no_file_and_one_for_english_are_refused_by_name(tmp_path):
+    path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(ConfigError, match=r"recoil\.po: is no file"):
+        language(LONG, tmp_path)
+    write_catalogue(tmp_path, "en", SAID[LONG], HEADS[LONG] | {"Language": "en"})
+    with pytest.raises(ConfigError, match="en is what the others are made from; give it a code of its own"):
+        language("en", tmp_path)
 
 
 DAMAGED = {

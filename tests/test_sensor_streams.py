@@ -18,7 +18,7 @@ from device.sensor.door import open_sensor
 from device.sensor.link import SensorLink
 from device.sensor.measuring import DeliveredShot
 from device.sensor.process import LOOK_EVERY_S, UNHEARD_S, SampleBuffer, SensorSilence, ShotAsked
-from device.sensor.streams import CsvSensor, SensorClock, SensorError, checked_samples
+from device.sensor.streams import BAD_LINES, CsvSensor, SensorClock, SensorError, checked_samples
 from tests.delivered_chain import DAMPED, RATE_HZ, stream_written
 from tests.gun_plugins import ACCELEROMETER, install_sensor
 from tests.waiting import wait_for
@@ -83,14 +83,36 @@ def test_lines_of_a_csv_are_samples_and_others_are_named(tmp_path: Path):
         file.write("time_s,acceleration\n1.0,2.5\n1.001,")
         file.flush()
         assert sensor.read() == [(1.0, 2.5)]
-        file.write("-2.5\n1.002;3\n")
-    with pytest.raises(SensorError, match=r"'1.002;3' is no line `time_s,acceleration_m_s2`"):
-        sensor.read()
+        file.write("-2.5\n1.00\x00;3\n0.5,1\n,,\n1.003,nan\n1.004,4\n")
+        file.flush()
+        assert sensor.read() == [(1.001, -2.5), (1.004, 4.0)]  # what was garbled, or goes back, is left out
+        assert sensor.dropped == 4
     sensor.close()
     with pytest.raises(SensorError, match="names no file"):
         CsvSensor("")
     with pytest.raises(SensorError, match="cannot be opened"):
         CsvSensor(str(tmp_path / "none"))
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("0,001;9,81\n" * BAD_LINES, r"'0,001;9,81' is no sample: a line is `time_s,acceleration_m_s2`, two numbers"),
+        ("1.0,2.5,3.5\n" * BAD_LINES, "'1.0,2.5,3.5' is no sample"),
+        ("1.0\t2.5\n" * BAD_LINES, "is no sample"),
+        ("1.0,2.5\r" * 200, "goes on for 1000 bytes; .* and ends with LF"),
+        ("5.0,1\n" + "1.0,1\n" * BAD_LINES, "'1.0,1' lies before 5.000000 s, as others do"),
+    ],
+)
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_stream_of_other_lines_is_named(lines: str, said: str, begun: bool, tmp_path: Path):
+    path = tmp_path / "stream.csv"
+    path.touch()
+    sensor = CsvSensor(str(path))
+    path.write_text("0.5,9.9\n" * begun + lines)
+    with pytest.raises(SensorError, match=said):
+        sensor.read()
+    sensor.close()
 
 
 def test_a_trace_with_a_gap_or_without_an_end_is_not_measured():
@@ -184,7 +206,8 @@ def open_sensor(rest, clock):
         ),
         (SENSOR.format(more="def read(self, n): ...", made="Sensor()"), r"it cannot be called as read\(\)"),
         (SENSOR.format(more="", made="1 / 0"), "sensor plug-in bad did not open 'x': ZeroDivisionError"),
-        ("", "sensor plug-in bad did not open 'x': AttributeError"),
+        ("", "sensor plug-in bad: its import failed: AttributeError"),
+        ("raise SystemExit('no chip')", "sensor plug-in bad: its import failed: SystemExit: no chip"),
     ],
 )
 def test_a_plug_in_that_lacks_something_is_refused_by_name(tmp_path, monkeypatch, source: str, said: str):

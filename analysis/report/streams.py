@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import codecs
 import io
+import os
+import re
 import sys
 import unicodedata
+from typing import TextIO
 
 _PLAIN = {
     **dict.fromkeys("−‐‑‒–—", "-"),
@@ -60,6 +63,36 @@ def forgive_streams() -> None:
     for stream, errors in ((sys.stdin, "backslashreplace"), (sys.stdout, _HANDLER), (sys.stderr, _HANDLER)):
         if isinstance(stream, io.TextIOWrapper):  # not where a test or a notebook reads along
             stream.reconfigure(errors=errors)
+
+
+_results: TextIO | None = None
+
+
+def keep_results_apart() -> None:
+    """From now on standard output is for results alone: what libraries and plug-ins print goes to standard error."""
+    global _results  # noqa: PLW0603 - the process has one standard output
+    if isinstance(sys.stdout, io.TextIOWrapper):  # not where a test or a notebook reads along
+        sys.stdout.flush()
+        _results = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+        os.dup2(2, 1)
+        sys.stdout = sys.stderr
+
+
+def results() -> TextIO:
+    """Where results go: standard output."""
+    return _results or sys.stdout
+
+
+def visible(text: str) -> str:
+    r"""Text whose control characters, which would steer a terminal, are escapes; lines and tabs stay.
+
+    >>> visible("a\x1b[2J\n")
+    'a\\x1b[2J\n'
+    """
+    return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
+
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def takes_all(stream: object) -> bool:

@@ -16,7 +16,7 @@ import typer
 from analysis.report.labels import text_columns
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json as in_json
-from analysis.report.streams import takes_all
+from analysis.report.streams import results, takes_all, visible
 from device.words import RecoilError
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ Progress = Callable[[str, int], AbstractContextManager[Tell]]
 
 def say(text: str) -> None:
     """A line on stderr."""
-    sys.stderr.write(f"{text}\n")
+    sys.stderr.write(f"{visible(text)}\n")
 
 
 _LONG_S = 10.0
@@ -129,8 +129,10 @@ def _drawn(table: Table, *, ruled: bool, unfolded: int) -> RichTable:
 
 
 def show(result: Any, text: str, as_json: bool) -> None:
-    """The result on stdout: for programs, or the text for people."""
-    sys.stdout.write(in_json(result, in_ascii=not takes_all(sys.stdout)).decode() if as_json else f"{text}\n")
+    """The result on stdout, at once: for programs, or the text for people."""
+    out = results()
+    out.write(in_json(result, in_ascii=not takes_all(out)).decode() if as_json else f"{visible(text)}\n")
+    out.flush()
 
 
 def each_of(names: Sequence[_Name], do: Callable[[_Name], _Found]) -> tuple[list[_Found], int]:

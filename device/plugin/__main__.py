@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import inspect
+import os
 import sys
 
-from device.plugin.door import entry_of
+from device.plugin.door import IMPORTED, entry_of
 
 
 def main(name: str) -> int:
-    """0 if it can be imported and called; what is wrong with it is the last line on stderr."""
+    """0 if it can be imported and called, and says so; else what is wrong with it is the last line on stderr."""
+    out = os.dup(1)
+    os.dup2(2, 1)  # what a plug-in prints is none of our words
     try:
         make = entry_of(name).load()
         if not callable(make):
             raise TypeError(f"the entry point is {make!r}; it must be a function of (address, methods, clock)")
         inspect.signature(make).bind("", {}, None)
     except Exception as error:  # noqa: BLE001 - a plug-in may do anything
-        sys.stderr.write(f"\n{type(error).__name__}: {error}\n")
+        sys.stderr.write(f"\n{type(error).__name__}: {' '.join(str(error).split())}\n")
         return 1
+    os.write(out, IMPORTED)
     return 0
 
 

@@ -109,7 +109,14 @@ def rig_at(
 
 
 def conformance(rig: ConformanceRig) -> tuple[ConformanceFinding, ...]:
-    """Every check on a gun that is opened anew for each, and closed; a check that is broken off is one not kept."""
+    """Every check on a gun that is opened anew for each, and closed; a check that is broken off is one not kept.
+
+    Of a gun that does not open that alone is said.
+    """
+    try:
+        rig.open_gun().close()
+    except DeviceError as error:
+        return (ConformanceFinding(check="opening", kept=False, said=str(error)),)
     return tuple(_found(name, check, rig) for name, check in GUN_CHECKS.items())
 
 

@@ -15,7 +15,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distributions
 from pathlib import Path
 from typing import cast
 
@@ -57,9 +57,38 @@ GUN_COMMANDS: dict[str, int] = {"identify": 0, "arm": 0, "fire": 2, "disarm": 0,
 """What a gun has, and how many parameters each is called with."""
 
 
-def plugin_names(kind: PluginKind = GUN_PLUGINS) -> tuple[str, ...]:
-    """The names of the plug-ins of a kind that are installed."""
-    return tuple(sorted({point.name for point in entry_points(group=kind.group)} - {*kind.own}))
+IMPORTED = b"imported"
+"""What the process that tries an import says at its end: another end is none of ours, whatever its exit code."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InstalledPlugins:
+    """The entry points of a kind, and of which packages they cannot be read, with the reason."""
+
+    points: tuple[EntryPoint, ...]
+    unreadable: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What they are called."""
+        return tuple(sorted({point.name for point in self.points}))
+
+
+def installed_plugins(kind: PluginKind = GUN_PLUGINS) -> InstalledPlugins:
+    """What is installed beside Recoil. A package whose entry points are broken hides no other's."""
+    points, unreadable, seen = list[EntryPoint](), list[str](), set[str]()
+    for package in distributions():
+        name = package.metadata["Name"] or "a package without a name"
+        if name in seen:  # what comes later on the path is not imported
+            continue
+        seen.add(name)
+        try:
+            points += package.entry_points.select(group=kind.group)
+        except Exception as error:  # noqa: BLE001 - anybody's file
+            unreadable.append(f"{name}: its entry_points.txt cannot be read ({error}): mend or uninstall it")
+    return InstalledPlugins(
+        points=tuple(point for point in points if point.name not in kind.own), unreadable=tuple(unreadable)
+    )
 
 
 def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
@@ -85,7 +114,7 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
             done = subprocess.run(
                 command,
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
                 stderr=errors,
                 env=environment,
                 timeout=seconds,
@@ -98,24 +127,32 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
             ) from error
         errors.seek(0)
         said = errors.read().decode(errors="replace").strip()
-    if done.returncode:
+    if done.returncode or done.stdout != IMPORTED:
         ended = f"was killed by signal {-done.returncode}" if done.returncode < 0 else "failed"
+        ended = ended if done.returncode else "ended the process"
         raise PluginError(f"gun plug-in {name}: its import {ended}: {said.rpartition(chr(10))[2] or 'it said nothing'}")
 
 
 def entry_of(name: str, kind: PluginKind = GUN_PLUGINS) -> EntryPoint:
     """The one entry point of that name. `ValueError`: there is none; `PluginError`: two packages have it."""
-    found = [point for point in entry_points(group=kind.group) if point.name == name and name not in kind.own]
+    there = installed_plugins(kind)
+    found = [point for point in there.points if point.name == name]
     if not found:
-        known = ", ".join(plugin_names(kind)) or "none is"
+        known = ", ".join(there.names) or "none is"
         raise ValueError(
             f"address is {name!r}; it must be {kind.ours}, or begin with the name of a {kind.name} that is installed "
-            f"beside Recoil ({known})"
+            + "; ".join([f"beside Recoil ({known})", *there.unreadable])
         )
     if len({point.value for point in found}) > 1:
         packages = ", ".join(sorted(_package(point) for point in found))
         raise PluginError(f"{kind.name} {name}: several packages bring it: {packages}; uninstall all but one")
-    return found[0]
+    (point,) = found[:1]
+    if not point.pattern.match(point.value):
+        raise PluginError(
+            f"{kind.name} {name}: the package {_package(point)} gives it as `{name} = {point.value}` in its entry "
+            "points; it must be `NAME = MODULE:FUNCTION`"
+        )
+    return point
 
 
 def _package(point: EntryPoint) -> str:

@@ -199,7 +199,7 @@ class GuardedGun:
     def _identity(self, said: object) -> Identity:
         if isinstance(said, Identity) and all(map(_is_text, (said.model, said.version, said.serial))):
             return said
-        raise PluginError(f"gun plug-in {self.name} identifies as {said!r}; it must be an Identity of three texts")
+        raise PluginError(f"gun plug-in {self.name} identifies as {said!r}; it must be an Identity of lines of text")
 
     # a shot
 
@@ -288,12 +288,13 @@ def _broken_length(order: PluginOrder, report: ShotReport) -> str:
     if report.home_predicted_s < report.pulse_end_s:
         return f"it is home at {report.home_predicted_s:.6f} s, before its drive ends at {report.pulse_end_s:.6f} s"
     if not _is_text(report.motion):
-        return f"its motion is {report.motion!r}; it must be text"
+        return f"its motion is {report.motion!r}; it must be a line of text"
     return ""
 
 
 def _is_text(value: object) -> bool:
-    return isinstance(value, str) and value != ""
+    """Whether it is a line of text, which can be shown and written down."""
+    return isinstance(value, str) and value != "" and value.isprintable()
 
 
 _STATES = ("disarmed", "armed", "resetting", "fault")

@@ -22,7 +22,7 @@ from device.sensor.process import (
     SensorSilence,
     ShotAsked,
 )
-from device.sensor.streams import Sensor, SensorError, checked_samples
+from device.sensor.streams import CsvSensor, Sensor, SensorError, checked_samples
 from device.words import DeviceError
 
 READ_EVERY_S = 0.005, 0.015
@@ -42,7 +42,7 @@ def serve_sensor(address: str, out: int) -> None:
         os.write(out, said_line(SensorSaid(ready=ready)))
         asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
         threading.Thread(target=_listen, args=(asked,), daemon=True).start()
-        threading.Thread(target=_watch, args=(silence, out), daemon=True).start()
+        threading.Thread(target=_watch, args=(sensor, silence, out), daemon=True).start()
         waiting = deque[ShotAsked]()
         while True:
             asked_s = _read(sensor, buffer, silence)
@@ -64,7 +64,7 @@ def _read(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> float
         said: object = sensor.read()
     except DeviceError:
         raise
-    except Exception as error:
+    except BaseException as error:  # SystemExit too
         raise SensorError(f"it broke off: {type(error).__name__}: {error}") from error
     samples = checked_samples("read", said, buffer.last_s)
     silence.answered(len(samples))
@@ -83,13 +83,15 @@ def _become_ready(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) 
         raise SensorError(f"it gives {buffer.rate_Hz:.0f} samples a second; at least {LEAST_RATE_HZ:g} are needed")
 
 
-def _watch(silence: SensorSilence, out: int) -> None:
-    """Say when samples come no more, and again: beside the reading, which may hang."""
-    silent = False
+def _watch(sensor: Sensor, silence: SensorSilence, out: int) -> None:
+    """Say when samples come no more, and again, and what was left out: beside the reading, which may hang."""
+    silent, dropped = False, 0
     while True:
         time.sleep(LOOK_EVERY_S)
         if silent != (silent := silence.look(time.monotonic())):
             os.write(out, said_line(SensorSaid(silent=silent)))
+        if isinstance(sensor, CsvSensor) and dropped != (dropped := sensor.dropped):
+            os.write(out, said_line(SensorSaid(dropped=dropped)))
 
 
 def _listen(asked: queue.SimpleQueue[ShotAsked]) -> None:
@@ -98,16 +100,16 @@ def _listen(asked: queue.SimpleQueue[ShotAsked]) -> None:
     os._exit(0)  # the run is over, whatever the sensor does
 
 
-def main(address: str) -> int:
-    """0: stdin ended; 1: the last line of stdout says why."""
+def main(address: str) -> None:
+    """Serve it, and end the process. 0: stdin ended; 1: the last line of stdout says why."""
     out = os.dup(1)
     os.dup2(2, 1)  # what a plug-in prints is none of our words
     try:
         serve_sensor(address, out)
     except (DeviceError, ValueError) as error:
         os.write(out, said_line(SensorSaid(ended=str(error))))
-    return 1
+    os._exit(1)  # the thread that listens would keep the interpreter from its end
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    main(sys.argv[1])

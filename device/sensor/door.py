@@ -28,7 +28,11 @@ def open_sensor(address: str, clock: Callable[[], float]) -> Sensor:
     point = entry_of(name, SENSOR_PLUGINS)
     who = f"{SENSOR_PLUGINS.name} {name}"
     try:
-        sensor: object = point.load()(rest, clock)
+        make = point.load()
+    except BaseException as error:  # SystemExit too
+        raise SensorError(f"{who}: its import failed: {type(error).__name__}: {error}") from error
+    try:
+        sensor: object = make(rest, clock)
     except DeviceError:
         raise
     except Exception as error:

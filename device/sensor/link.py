@@ -34,11 +34,15 @@ _ENDED_S = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorSaid:
-    """One thing that the sensor's process says. `silent`: no sample comes any more, or one came again."""
+    """One thing that the sensor's process says.
+
+    `silent`: no sample comes any more, or one came again; `dropped`: so many lines that were none were left out.
+    """
 
     ready: SensorReady | None = None
     reply: ShotReply | None = None
     silent: bool | None = None
+    dropped: int | None = None
     ended: str = ""
 
 
@@ -56,10 +60,15 @@ def asked_of(line: bytes) -> ShotAsked:
 
 
 class SensorEnd(Protocol):
-    """Whoever measures shots for a run. `silent`: no sample comes just now; `ended`: why none will come any more."""
+    """Whoever measures shots for a run.
+
+    `silent`: no sample comes just now; `ended`: why none will come any more; `dropped`: how many lines of its stream
+    were no samples and were left out.
+    """
 
     address: str
     silent: bool
+    dropped: int
     ended: str
 
     def ask(self, pulse_start_s: float, actuator: Method) -> ShotReply:
@@ -73,7 +82,7 @@ class SensorLink:
     """A sensor in its own process. `SensorError`: it is refused, and why."""
 
     def __init__(self, address: str, start_s: float = START_S) -> None:
-        self.address, self.silent, self.ended = address, False, ""
+        self.address, self.silent, self.dropped, self.ended = address, False, 0, ""
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "device.sensor", address],
@@ -87,11 +96,13 @@ class SensorLink:
         self._count = 0
         threading.Thread(target=self._listen, daemon=True, name="sensor").start()
         try:
-            ready = self._heard(
-                start_s, f"was not ready within {start_s:g} s; did its import or its device hang?"
-            ).ready
+            ready = self._heard(start_s).ready
             if ready is None:
                 raise SensorError(f"{self.address}: spoke of a shot before it was ready")
+        except queue.Empty:
+            self.close()
+            why = f"was not ready within {start_s:g} s; did its import or its device hang?"
+            raise SensorError(f"{self.address}: {why}") from None
         except BaseException:
             self.close()
             raise
@@ -108,11 +119,25 @@ class SensorLink:
             self._process.stdin.flush()
         except OSError:
             pass  # it has ended, and says why below
-        wait_s = max(0.0, pulse_start_s - time.monotonic()) + _LONGEST_S + UNHEARD_S + SENSOR_ANSWER_S
-        reply = self._heard(wait_s, "does not answer").reply
-        if reply is None or reply.number != self._count:
-            raise SensorError(f"{self.address}: answered another shot than it was asked for")
-        return reply
+        soon_s = max(time.monotonic(), pulse_start_s) + _LONGEST_S + UNHEARD_S
+        for until_s in (soon_s, soon_s + SENSOR_ANSWER_S):
+            reply = self._answer_until(until_s)
+            if reply is not None:
+                return reply
+            if self.silent:
+                return ShotReply(number=self._count, because="the sensor was silent")
+        raise SensorError(f"{self.address}: does not answer")
+
+    def _answer_until(self, until_s: float) -> ShotReply | None:
+        """The answer on the last shot, if it comes in time; others are late, of shots while it was silent."""
+        with suppress(queue.Empty):
+            while True:
+                reply = self._heard(until_s - time.monotonic()).reply
+                if reply is None or reply.number > self._count:
+                    raise SensorError(f"{self.address}: answered another shot than it was asked for")
+                if reply.number == self._count:
+                    return reply
+        return None
 
     def close(self) -> None:
         """End the process."""
@@ -127,11 +152,9 @@ class SensorLink:
         if self._process.stdout is not None:
             self._process.stdout.close()
 
-    def _heard(self, seconds: float, silent: str) -> SensorSaid:
-        try:
-            said = self._said.get(timeout=seconds)
-        except queue.Empty:
-            raise SensorError(f"{self.address}: {silent}") from None
+    def _heard(self, seconds: float) -> SensorSaid:
+        """What it says next. `queue.Empty`: nothing in that time; `SensorError`: it ended."""
+        said = self._said.get(timeout=max(0.0, seconds))
         if said.ended:
             self._said.put(said)  # for whoever asks again
             raise SensorError(f"{self.address}: {said.ended}")
@@ -147,10 +170,10 @@ class SensorLink:
                 except ValidationError:
                     said = SensorSaid(ended="its process said what cannot be")
                 ended = ended or said.ended
-                if said.silent is None:
+                self.silent = self.silent if said.silent is None else said.silent
+                self.dropped = self.dropped if said.dropped is None else said.dropped
+                if said.silent is None and said.dropped is None:
                     self._said.put(said)
-                else:
-                    self.silent = said.silent
         if not ended:
             code = self._process.wait()
             how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"

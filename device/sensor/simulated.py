@@ -84,7 +84,7 @@ def ready_of(address: str, gun: str) -> SensorReady:
 class SimulatedSensor:
     """Measures by the model; its noise, and where its samples lie, come from `random`."""
 
-    silent, ended = False, ""
+    silent, dropped, ended = False, 0, ""
 
     def __init__(self, address: str, gun: str, random: np.random.Generator) -> None:
         self.address = address

@@ -17,6 +17,10 @@ from device.words import DeviceError, is_finite
 Sample = tuple[float, float]
 """Seconds on the sensor's own clock, which never go back, and m/s2 along the barrel, recoil positive."""
 MAX_BYTES = 1 << 16
+LINE_BYTES = 1000
+"""No line of a sample is longer."""
+BAD_LINES = 20
+"""So many lines in a row that are no samples end a stream of lines. Assumed: longer than a header."""
 CLOCK_DRIFT = 0.01
 """So much faster or slower than this machine's a sensor's clock may go (assumed)."""
 ARRIVALS_S = 20.0
@@ -104,7 +108,8 @@ class SensorClock:
 class CsvSensor:
     """Lines `time_s,acceleration_m_s2`, from a file that grows, a pipe or a device.
 
-    What is there already is passed over; so are lines of words, such as a header, before the first of numbers.
+    What is there already is passed over. A line that is none, such as a header or one that was garbled, or whose time
+    goes back, is left out; several in a row end the stream. `dropped`: how many were left out since the first sample.
     """
 
     def __init__(self, path: str) -> None:
@@ -116,7 +121,8 @@ class CsvSensor:
             raise SensorError(f"cannot be opened ({error.strerror})") from error
         with suppress(OSError):  # a pipe has no end to go to
             os.lseek(self._descriptor, 0, os.SEEK_END)
-        self._rest, self._begun = b"", False
+        self._rest, self._last_s, self._in_a_row = b"", -np.inf, 0
+        self.dropped = 0
 
     def read(self) -> Sequence[Sample]:
         """The samples of the whole lines since the last call. `SensorError` names a line that is none."""
@@ -127,23 +133,47 @@ class CsvSensor:
         except OSError as error:
             raise SensorError(f"cannot be read any more ({error.strerror})") from error
         *lines, self._rest = (self._rest + data).split(b"\n")
-        return list(self._numbers(lines))
+        if len(self._rest) > LINE_BYTES:
+            raise SensorError(f"{_shown(self._rest)} goes on for {LINE_BYTES} bytes; {_LINE_RULE}")
+        return list(self._samples(lines))
 
-    def _numbers(self, lines: list[bytes]) -> Iterator[Sample]:
+    def _samples(self, lines: list[bytes]) -> Iterator[Sample]:
         for line in filter(None, map(bytes.strip, lines)):
-            try:
-                time_s, acceleration = map(float, line.split(b","))
-            except ValueError as error:
-                if not self._begun:
-                    continue  # a header, or the end of a line that was cut in two
-                shown = line[:60].decode(errors="replace")
-                raise SensorError(f"{shown!r} is no line `time_s,acceleration_m_s2`") from error
-            self._begun = True
-            yield time_s, acceleration
+            sample = _sample_of(line)
+            if sample is None or sample[0] < self._last_s:
+                self._leave_out(line, sample)
+            else:
+                self._last_s, self._in_a_row = sample[0], 0
+                yield sample
+
+    def _leave_out(self, line: bytes, sample: Sample | None) -> None:
+        self._in_a_row += 1
+        self.dropped += bool(np.isfinite(self._last_s))
+        if self._in_a_row == BAD_LINES:
+            why = f"is no sample: {_LINE_RULE}" if sample is None else f"lies before {self._last_s:.6f} s, as others do"
+            raise SensorError(f"{_shown(line)} {why}")
 
     def close(self) -> None:
         """Close the file."""
         os.close(self._descriptor)
+
+
+_LINE_RULE = (
+    "a line is `time_s,acceleration_m_s2`, two numbers with decimal points and a comma between them, and ends with LF"
+)
+
+
+def _shown(line: bytes) -> str:
+    return repr(line[:60].decode(errors="replace"))
+
+
+def _sample_of(line: bytes) -> Sample | None:
+    """What is on a line; `None` if it is no sample."""
+    try:
+        time_s, acceleration = map(float, line.split(b","))
+    except ValueError:
+        return None
+    return (time_s, acceleration) if is_finite(time_s) and is_finite(acceleration) else None
 
 
 def checked_samples(who: str, said: object, after_s: float) -> list[Sample]:

@@ -27,6 +27,11 @@ NAME, FONTS, DIRECTION, CHECKED_BY = "X-Language-Name", "X-Fonts", "X-Direction"
 """The entries in the head of a catalogue that say what gettext does not ask for."""
 NOBODY = "nobody"
 """What the last of them says, where no native speaker has checked the catalogue."""
+_NO_NAMES = re.compile(
+    r"(?:nobody|no[ -]?one|none|not|n/?a|to ?do|tb[ad]|fixme|unknown|unchecked|your name|full name)\b",
+    re.IGNORECASE,
+)
+"""How what is no name begins that stands in its place."""
 _COMPILED = ".mo"
 
 
@@ -84,7 +89,11 @@ def language(code: str, folder: Path | None = None) -> Language:
             "docs/howto/languages.md says how to make one, which --catalogues DIR then finds"
         )
     path = known[code]
-    return ENGLISH if path is None else _read(code, path)
+    if path is None:
+        return ENGLISH
+    if code == ENGLISH.code:
+        raise ConfigError(f"{path}: {code} is what the others are made from; give it a code of its own, such as en_GB")
+    return _read(code, path)
 
 
 def check_allowed(one: Language, *, unchecked: bool) -> None:
@@ -105,6 +114,8 @@ class _Absent(gettext.NullTranslations):
 
 
 def _read(code: str, path: Path) -> Language:
+    if not path.is_file():
+        raise ConfigError(f"{path}: is no file")
     try:
         return _language(code, *(_compiled(path) if path.suffix == _COMPILED else _of_source(path)))
     except OSError as error:
@@ -155,6 +166,12 @@ def _printed(translate: Callable[[str], str], text: str) -> str:
     return found
 
 
+def _checker(name: str) -> str:
+    """Who checked a catalogue; empty for what is no name: it has fewer than two letters, or says that nobody did."""
+    letters = sum(map(str.isalpha, name))
+    return "" if letters < 2 or _NO_NAMES.match(name.strip(" <([")) else name
+
+
 def _language(code: str, head: Mapping[str, str], say: Callable[[str], str]) -> Language:
     own, direction = head.get("language", ""), head.get(DIRECTION.lower(), "ltr")
     if own != code or not re.match(LANGUAGE_CODE, code):
@@ -170,7 +187,7 @@ def _language(code: str, head: Mapping[str, str], say: Callable[[str], str]) -> 
         name=head.get(NAME.lower(), "") or code,
         fonts=fonts,
         right_to_left=direction == "rtl",
-        checked_by="" if (name := head.get(CHECKED_BY.lower(), NOBODY)) == NOBODY else name,
+        checked_by=_checker(head.get(CHECKED_BY.lower(), NOBODY)),
         messages=translated(look_up),
         look_up=look_up,
     )

@@ -132,6 +132,8 @@ class ShotRecorder:
             self._fired.put(None)
             self._thread.join(SETTLED_S)
         self._tell_undelivered()
+        if self._end.dropped and self._live is not None:
+            self._note(_DROPPED.format(self._end.dropped))
         self._live = None
 
     def close(self) -> None:
@@ -281,6 +283,7 @@ class ShotRecorder:
 
 _SILENT = "The sensor is silent: no sample comes. The run goes on; its shots are marked “not-measured” until one does."
 _HEARD = "The sensor is heard again."
+_DROPPED = "Lines of the sensor that were no samples and were left out: {}. Look at its cable."
 
 
 def parts_of(seen: DeliveredShot, expected: ExpectedShot) -> ShotParts:

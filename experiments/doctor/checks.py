@@ -30,6 +30,7 @@ from pydantic import TypeAdapter
 from device import DeviceError, open_gun
 from device.parameters import GunParameters
 from device.plugin.conformance import conformance, rig_at
+from device.plugin.guard import PluginError
 from device.serial_gun.gun import speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
@@ -264,6 +265,8 @@ def _disk(results: Path) -> tuple[DoctorFinding, ...]:
 def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
     try:
         return (verdicts.of_link(within_seconds(DEADLINE_S, partial(gun_line, address)), limit_s),)
+    except PluginError as error:
+        return (verdicts.of_failure("gun", str(error)),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
 

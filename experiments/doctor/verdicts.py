@@ -201,6 +201,9 @@ SOON_SEEN = 3.0
 def of_sensor(found: figures.SensorFigures) -> figures.DoctorFinding:
     """A sensor, and whether it sees a damper that slips."""
     measured = f"{found.sensor}: {found.rate_Hz:.0f} samples/s, noise {found.noise_m_s2:.3f} m/s² at rest"
+    if found.noise_m_s2 == 0:
+        still = "its value never changes, as no sensor's does: see that it measures, and in m/s² with enough digits"
+        return figures.DoctorFinding(check="sensor", verdict="fails", measured=measured, advice=still, figures=found)
     if found.shots_to_see is None:
         return _judged("sensor", measured, "", found)
     measured += f"; a damper that slips by 10 % is seen in about {max(1.0, found.shots_to_see):.1f} shots"
@@ -363,6 +366,7 @@ _WINDOWLESS = (
     "libxcb-xkb1 libxkbcommon-x11-0"
 )
 _BROKEN = {
+    "gun": "see what the plug-in's own pages say; mend, update or uninstall it",
     "sensor": "check its power, cable and address; the run goes without it",
     "display": _WINDOWLESS,
     "keyboard": _WINDOWLESS,

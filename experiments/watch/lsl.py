@@ -71,7 +71,7 @@ class MarkerOutlets:
     def __init__(self, source: str) -> None:
         try:
             import pylsl  # noqa: PLC0415 - an extra, used here alone
-        except (ImportError, OSError, RuntimeError) as error:  # no package, or a package without its library
+        except Exception as error:  # no package, or one without its library, or broken
             raise NoStreams(f"no Lab Streaming Layer here ({' '.join(str(error).split())}): {_INSTALL}") from error
         self._lsl, self._source = pylsl, source
         try:

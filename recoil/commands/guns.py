@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -109,7 +108,6 @@ def twin(
 
     def tell(plugged: feature.Plugged) -> None:
         show(plugged, f"{plugged.address}\nTry: recoil doctor --gun {plugged.gun}", as_json)
-        sys.stdout.flush()
 
     feature.serve(asked, tell)
 

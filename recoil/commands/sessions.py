@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -167,7 +166,6 @@ def watch(
 
     def tell(page: feature.WatchPage) -> None:
         show(page, f"{page.address}\nOpen it in a browser of this machine. Ctrl+C ends it.", as_json)
-        sys.stdout.flush()
 
     feature.serve_page(results, port, tell)
 
@@ -187,7 +185,6 @@ def markers(
             say(f"recoil: {made.problem}")
         names = " and ".join(f"“{name}”" for name in made.streams)
         show(made, f"Streams {names} ({made.source}), of runs in {made.folder}\nCtrl+C ends them.", as_json)
-        sys.stdout.flush()
 
     feature.send_markers(watched_folder(results), tell, lambda text: say(f"recoil: {text}"), threading.Event())
 

@@ -17,7 +17,9 @@ def look() -> MarkerStream:
     """Make a stream, find it as a recorder would, and send markers through it."""
     try:
         import pylsl  # noqa: PLC0415 - an extra; raises where it finds no library
-    except RuntimeError as error:
+    except ModuleNotFoundError:
+        raise
+    except (ImportError, OSError, RuntimeError) as error:
         raise Absent(f"pylsl finds no library of Lab Streaming Layer: {' '.join(str(error).split())}") from error
     source, version = f"recoil-doctor-{uuid4().hex}", f"{pylsl.library_version() / 100:.2f}"
     outlet = pylsl.StreamOutlet(pylsl.StreamInfo("Recoil doctor", "Markers", 1, pylsl.IRREGULAR_RATE, "string", source))
