@@ -289,6 +289,32 @@ def test_a_real_process_measures_and_says_why_it_ended(tmp_path: Path, monkeypat
         link.close()
 
 
+HANGS = STOPS.replace(
+    'raise EOFError("the plug was pulled")', "while not os.path.exists(self.plug): __import__('time').sleep(0.01)"
+)
+
+
+@pytest.mark.slow
+def test_a_sensor_whose_read_hangs_is_silent_until_it_goes_on_and_no_shot_is_mistaken_for_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    install_sensor(monkeypatch, tmp_path, HANGS, name="hangs", module="hanging_sensor")
+    plug = tmp_path / "plug"
+    plug.touch()
+    link = SensorLink(f"hangs:{plug}")
+    try:
+        plug.unlink()
+        for _ in range(2):
+            assert link.ask(time.monotonic(), DAMPED).because == "the sensor was silent"
+        plug.touch()
+        wait_for(lambda: not link.silent)
+        reply = link.ask(time.monotonic() + 0.5, DAMPED)
+        assert (reply.number, link.ended) == (3, "")
+        assert reply.because in ("", "the sensor gave no samples of it") or "gap" in reply.because  # a busy machine
+    finally:
+        link.close()
+
+
 def shot_of(link: SensorLink) -> DeliveredShot | None:
     """What was measured of the shot at the next full second; `None` where this machine stood still."""
     return link.ask(math.floor(time.monotonic()) + 1.0, DAMPED).seen

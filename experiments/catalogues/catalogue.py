@@ -28,7 +28,7 @@ NAME, FONTS, DIRECTION, CHECKED_BY = "X-Language-Name", "X-Fonts", "X-Direction"
 NOBODY = "nobody"
 """What the last of them says, where no native speaker has checked the catalogue."""
 _NO_NAMES = re.compile(
-    r"(?:nobody|no[ -]?one|none|not|n/?a|to ?do|tb[ad]|fixme|unknown|unchecked|your name|full name)\b",
+    r"(?:nobody|no[ -]?one|none|not|n/a|to ?do|tb[ad]|fixme|unknown|unchecked|your name|full name)\b",
     re.IGNORECASE,
 )
 """How what is no name begins that stands in its place."""
