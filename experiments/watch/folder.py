@@ -6,7 +6,7 @@ import os
 import stat
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -143,19 +143,26 @@ class JournalFiles:
 def journals_in(folder: Path) -> JournalFiles:
     """What is named as the files are that runs write their records to. What cannot be read hides nothing else."""
     stats, set_aside, problems = dict[Path, os.stat_result](), 0, list[str]()
+    for one in _named_as_journals(folder, problems):
+        found = _stat(one, problems)
+        if found is None:
+            continue
+        if not stat.S_ISREG(found.st_mode):
+            problems.append(f"{one.path}: is no file, though it is named like a journal; it is left alone")
+        elif one.name.endswith(ENDING):
+            stats[Path(one)] = found
+        else:
+            set_aside += 1
+    return JournalFiles(stats=stats, set_aside=set_aside, problems=tuple(problems))
+
+
+def _named_as_journals(folder: Path, problems: list[str]) -> Iterator[os.DirEntry[str]]:
+    """What in people's folders has the name of a journal, or of one that was set aside."""
     for person in _listed(folder, problems):
         found = _stat(person, problems) if person.name.startswith("sub-") else None
-        for one in _listed(Path(person), problems) if found and stat.S_ISDIR(found.st_mode) else ():
-            named = _STEM in one.name and one.name.endswith(".jsonl")
-            if not (named and (found := _stat(one, problems))):
-                continue
-            if not stat.S_ISREG(found.st_mode):
-                problems.append(f"{one.path}: is no file, though it is named like a journal; it is left alone")
-            elif one.name.endswith(ENDING):
-                stats[Path(one)] = found
-            else:
-                set_aside += 1
-    return JournalFiles(stats=stats, set_aside=set_aside, problems=tuple(problems))
+        if found is not None and stat.S_ISDIR(found.st_mode):
+            files = _listed(Path(person), problems)
+            yield from (one for one in files if _STEM in one.name and one.name.endswith(".jsonl"))
 
 
 _STEM = ENDING.removesuffix(".jsonl")
