@@ -89,6 +89,25 @@ class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
 
 
+def said_by(error: BaseException) -> str:
+    r"""What an exception of somebody else's code says, on one line that can be shown and written down.
+
+    >>> said_by(ValueError("no\n\x1b[2Jcard\udcff")), said_by(SystemExit())
+    ('ValueError: no \\x1b[2Jcard\\udcff', 'SystemExit')
+    """
+    text = line_of(error)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def line_of(error: BaseException) -> str:
+    """The same without the kind of exception; empty where it says nothing."""
+    try:
+        text = " ".join(str(error).split())
+    except Exception:  # noqa: BLE001 - it says nothing
+        return ""
+    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+
+
 def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is a real number: of Python or numpy, whole or not, but neither true nor false, nor text.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -16,10 +17,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from device import GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
+from device import Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
 from device.methods import drive_of, paper_methods
 from device.plugin import door, guard
-from device.plugin.conformance import GUN_CHECKS, ConformanceRig, StillClock, broken, conformance, rig_at
+from device.plugin.conformance import (
+    GUN_CHECKS,
+    ConformanceFinding,
+    ConformanceRig,
+    OpenedGuns,
+    StillClock,
+    broken,
+    conformance,
+    rig_at,
+)
 from device.plugin.guard import GuardedGun, PluginError
 from device.simulated import SimulatedGun
 from device.words import DIRECTIONS
@@ -35,6 +45,7 @@ from tests.conftest import RECOIL
 from tests.firmware import emulated
 from tests.gun_plugins import ROOT, install, install_sound_card
 from tests.twins import a_shot, a_twin
+from tests.waiting import PATIENCE_S, wait_for
 
 TRIALS = 8
 
@@ -260,13 +271,11 @@ def open_gun(address, methods, clock):
 @pytest.mark.slow
 def test_what_a_plug_in_prints_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, tmp_path, CHATTY, name="chatty", module="chatty_gun")
-    words = ["run", "direction", "--practice", "--screen", "synthetic", "--participant", "P01", "--json"]
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    done = subprocess.run(
-        [RECOIL, *words, "--gun", "chatty:"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout).keys() == {"journal", "table"}
+    words = [RECOIL, "doctor", "--gun", "chatty:", "--json"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    (gun,) = [one for one in json.loads(done.stdout)["checks"] if one["check"] == "gun"]
+    assert "simulated" in gun["measured"], gun
     for said in ("said at import", "written by a library", "said when it was opened"):
         assert said in done.stderr
 
@@ -276,6 +285,60 @@ def test_a_gun_that_does_not_open_is_said_once(tmp_path: Path, monkeypatch: pyte
     (only,) = conformance(rig_at("bad:"))
     assert (only.check, only.kept) == ("opening", False)
     assert "ZeroDivisionError" in only.said
+
+
+def test_a_kit_that_is_broken_off_lets_go_of_its_gun_at_once_and_opens_no_other(sound_card: str) -> None:
+    rig, guns, found = rig_at(sound_card, trials=10_000, speed=10.0), list[Gun](), list[ConformanceFinding]()
+
+    def open_one() -> Gun:
+        guns.append(rig.open_gun())
+        return guns[-1]
+
+    opened = OpenedGuns(open_one)
+    kit = threading.Thread(target=lambda: conformance(replace(rig, open_gun=opened.open), found.append), daemon=True)
+    kit.start()
+    wait_for(lambda: guns and guns[-1].status().shots > 5)  # the trials have begun
+    gun = guns[-1]
+    opened.let_go()
+    with pytest.raises(LinkError, match="closed"):
+        gun.arm()
+    kit.join(PATIENCE_S)
+    assert not kit.is_alive()
+    assert [one.kept for one in found[-4:]] == [False] * 4
+    assert all("broken off" in one.said for one in found[-3:])
+
+
+NOTES = """
+from device.simulated import SimulatedGun
+class Noting(SimulatedGun):
+    def arm(self): note("arm"); super().arm()
+    def fire(self, shot, at_s=None): note("fire"); return super().fire(shot, at_s)
+    def disarm(self): note("disarm"); super().disarm()
+    def close(self): note("close"); super().close()
+def note(what):
+    with open("heard.txt", "a") as file: file.write(what + "\\n")
+def open_gun(address, methods, clock):
+    return Noting(methods, clock)
+"""
+
+
+@pytest.mark.slow
+def test_an_interrupted_doctor_fires_no_more_and_leaves_no_gun_armed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(monkeypatch, tmp_path, NOTES, name="notes", module="noting_gun")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    words = [RECOIL, "doctor", "--gun", "notes:", "--fire", "1000"]
+    heard = tmp_path / "heard.txt"
+    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as doctor:
+        wait_for(lambda: heard.exists() and heard.read_text().count("fire") > 5)
+        doctor.send_signal(signal.SIGINT)
+        _, said = doctor.communicate(timeout=PATIENCE_S)
+    assert (doctor.returncode, said.count("interrupted")) == (130, 1)
+    told = heard.read_text().split()
+    last_fire = len(told) - 1 - told[::-1].index("fire")
+    assert {"disarm", "close"} <= set(told[last_fire:])
+    assert "arm" not in told[len(told) - 1 - told[::-1].index("disarm") :]
 
 
 # what the guard believes, and what it lets through
@@ -339,6 +402,7 @@ def guarded(clock: Any, **lie: Any) -> tuple[GuardedGun, Liar]:
         ({"pulse_start_s": float("nan")}, "they must be finite"),
         ({"home_predicted_s": 99.0}, "it is home at 99.000000 s, before its drive ends"),
         ({"motion": None}, "its motion is None"),
+        ({"motion": "up\ndown"}, "it must be a line of text"),
         ({"shot": a_shot("vibration")}, "ordered was Shot"),
     ],
 )

@@ -90,6 +90,8 @@ def test_lines_of_a_csv_are_samples_and_others_are_named(tmp_path: Path):
     sensor.close()
     with pytest.raises(SensorError, match="names no file"):
         CsvSensor("")
+    with pytest.raises(SensorError, match="is a folder"):
+        CsvSensor(str(tmp_path))
     with pytest.raises(SensorError, match="cannot be opened"):
         CsvSensor(str(tmp_path / "none"))
 
@@ -220,7 +222,10 @@ def test_a_plug_in_that_lacks_something_is_refused_by_name(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("source", "said"),
     [
-        ("import time\ntime.sleep(3600)\n", "sleeper:x: was not ready within 1 s; did its import or its device hang"),
+        (
+            "import time\ntime.sleep(3600)\n",
+            "sleeper:x: was not ready within 1 s; did its import, its device or a read",
+        ),
         ("import os\nos._exit(3)\n", "sleeper:x: its process ended with exit code 3"),
     ],
 )

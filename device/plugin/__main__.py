@@ -7,6 +7,7 @@ import os
 import sys
 
 from device.plugin.door import IMPORTED, entry_of
+from device.words import said_by
 
 
 def main(name: str) -> int:
@@ -19,7 +20,7 @@ def main(name: str) -> int:
             raise TypeError(f"the entry point is {make!r}; it must be a function of (address, methods, clock)")
         inspect.signature(make).bind("", {}, None)
     except Exception as error:  # noqa: BLE001 - a plug-in may do anything
-        sys.stderr.write(f"\n{type(error).__name__}: {' '.join(str(error).split())}\n")
+        sys.stderr.write(f"\n{said_by(error)}\n")
         return 1
     os.write(out, IMPORTED)
     return 0

@@ -18,9 +18,21 @@ from itertools import cycle, islice
 
 from device import open_gun
 from device.methods import Method, drive_of, paper_methods
-from device.plugin.guard import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S, answer_within
+from device.plugin.guard import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S, PluginSilent, answer_within
 from device.serial_gun.gun import speed_of
-from device.words import DIRECTIONS, DeviceError, Effect, Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport
+from device.words import (
+    DIRECTIONS,
+    DeviceError,
+    Effect,
+    Gun,
+    GunStatus,
+    LimitError,
+    LinkError,
+    Pulse,
+    Shot,
+    ShotReport,
+    said_by,
+)
 
 FEW_TRIALS = 20
 EVERY_S = 0.205
@@ -108,16 +120,55 @@ def rig_at(
     )
 
 
-def conformance(rig: ConformanceRig) -> tuple[ConformanceFinding, ...]:
+class OpenedGuns:
+    """The guns that a kit opens one after another: broken off from another thread, none stays armed."""
+
+    def __init__(self, open_gun: Callable[[], Gun]) -> None:
+        self._open_gun = open_gun
+        self._lock = threading.Lock()
+        self._guns: list[Gun] = []
+        self._over = False
+
+    def open(self) -> Gun:
+        """The next gun. `LinkError`: it is over."""
+        gun = self._open_gun()
+        with self._lock:
+            if not self._over:
+                self._guns.append(gun)
+                return gun
+        gun.close()
+        raise LinkError("the tries were broken off")
+
+    def let_go(self) -> None:
+        """Disarm and close what is open; none is opened any more."""
+        with self._lock:
+            self._over = True
+        for gun in self._guns:
+            with suppress(DeviceError):
+                gun.close()
+
+
+def _untold(_: ConformanceFinding) -> None:
+    """Nobody waits."""
+
+
+def conformance(
+    rig: ConformanceRig, tell: Callable[[ConformanceFinding], None] = _untold
+) -> tuple[ConformanceFinding, ...]:
     """Every check on a gun that is opened anew for each, and closed; a check that is broken off is one not kept.
 
-    Of a gun that does not open that alone is said.
+    Of a gun that does not open that alone is said. `tell` is called with each finding.
     """
     try:
         rig.open_gun().close()
     except DeviceError as error:
-        return (ConformanceFinding(check="opening", kept=False, said=str(error)),)
-    return tuple(_found(name, check, rig) for name, check in GUN_CHECKS.items())
+        tell(finding := ConformanceFinding(check="opening", kept=False, said=str(error)))
+        return (finding,)
+    found = list[ConformanceFinding]()
+    for name, check in GUN_CHECKS.items():
+        found.append(_found(name, check, rig))
+        tell(found[-1])
+    return tuple(found)
 
 
 def broken(findings: Iterable[ConformanceFinding]) -> list[str]:
@@ -139,7 +190,7 @@ def _found(name: str, check: KitCheck, rig: ConformanceRig) -> ConformanceFindin
     except RuleBroken as error:
         return ConformanceFinding(check=name, kept=False, said=str(error))
     except Exception as error:  # noqa: BLE001 - whatever a gun raises that no gun may
-        return ConformanceFinding(check=name, kept=False, said=f"broke off: {type(error).__name__}: {error}")
+        return ConformanceFinding(check=name, kept=False, said=f"broke off: {said_by(error)}")
 
 
 def _expect(kept: bool, rule: str) -> None:
@@ -213,6 +264,8 @@ def _recovered(gun: Gun) -> GunStatus:
         try:
             gun.disarm()
             return gun.status()
+        except PluginSilent:
+            raise
         except LinkError as error:
             _expect(time.monotonic() < end_s, f"after a failure it does not answer for {RECOVERED_S:g} s: {error}")
             time.sleep(0.1)

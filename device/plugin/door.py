@@ -15,13 +15,13 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, distributions
+from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import Path
 from typing import cast
 
 from device.methods import Method
 from device.plugin.guard import GuardedGun, PluginError, answer_within
-from device.words import Gun, LinkError
+from device.words import Gun, LinkError, line_of, said_by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +35,10 @@ class PluginKind:
     name: str
     own: tuple[str, ...]
     ours: str
+
+    def takes(self, name: str) -> bool:
+        """Whether a plug-in can be called so in an address."""
+        return name not in self.own and name != "" and ":" not in name
 
 
 GUN_PLUGINS = PluginKind(
@@ -63,7 +67,7 @@ IMPORTED = b"imported"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InstalledPlugins:
-    """The entry points of a kind, and of which packages they cannot be read, with the reason."""
+    """The entry points of a kind, and of which packages they cannot be read or used, with the reason."""
 
     points: tuple[EntryPoint, ...]
     unreadable: tuple[str, ...]
@@ -78,17 +82,33 @@ def installed_plugins(kind: PluginKind = GUN_PLUGINS) -> InstalledPlugins:
     """What is installed beside Recoil. A package whose entry points are broken hides no other's."""
     points, unreadable, seen = list[EntryPoint](), list[str](), set[str]()
     for package in distributions():
-        name = package.metadata["Name"] or "a package without a name"
+        name = _package_name(package)
         if name in seen:  # what comes later on the path is not imported
             continue
         seen.add(name)
         try:
-            points += package.entry_points.select(group=kind.group)
-        except Exception as error:  # noqa: BLE001 - anybody's file
-            unreadable.append(f"{name}: its entry_points.txt cannot be read ({error}): mend or uninstall it")
-    return InstalledPlugins(
-        points=tuple(point for point in points if point.name not in kind.own), unreadable=tuple(unreadable)
-    )
+            found = package.entry_points.select(group=kind.group)
+        except (TypeError, ValueError) as error:  # a line that is none; bytes that are no UTF-8
+            why = error if isinstance(error, UnicodeError) else "a line is no `NAME = MODULE:FUNCTION`"
+            unreadable.append(f"{name}: its entry_points.txt cannot be read ({why}): mend or uninstall it")
+            continue
+        points += (one for one in found if kind.takes(one.name))
+        unreadable += (
+            f"{name}: its {kind.name} {one.name!r} cannot be called so: another name must be chosen"
+            for one in found
+            if not kind.takes(one.name)
+        )
+    return InstalledPlugins(points=tuple(points), unreadable=tuple(unreadable))
+
+
+def _package_name(package: Distribution) -> str:
+    try:
+        return package.metadata["Name"] or _NAMELESS
+    except UnicodeError:
+        return Path(str(getattr(package, "_path", _NAMELESS))).name
+
+
+_NAMELESS = "a package without a name"
 
 
 def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
@@ -98,9 +118,9 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     try:
         gun = answer_within(PLUGIN_OPEN_S, lambda: make(rest, dict(methods), clock))
     except LinkError as error:
-        raise PluginError(f"{address}: {error}") from error
+        raise PluginError(f"{address}: {line_of(error)}") from error
     except Exception as error:
-        raise PluginError(f"gun plug-in {name} did not open {rest!r}: {type(error).__name__}: {error}") from error
+        raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}") from error
     check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")
     return GuardedGun(name, cast("Gun", gun), methods, clock)
 
@@ -156,7 +176,7 @@ def entry_of(name: str, kind: PluginKind = GUN_PLUGINS) -> EntryPoint:
 
 
 def _package(point: EntryPoint) -> str:
-    return point.dist.name if point.dist is not None else point.value
+    return _package_name(point.dist) if point.dist is not None else point.value
 
 
 def _loaded(point: EntryPoint) -> Callable[..., object]:
@@ -165,7 +185,7 @@ def _loaded(point: EntryPoint) -> Callable[..., object]:
     try:
         make = answer_within(IMPORT_S, point.load)
     except Exception as error:
-        raise PluginError(f"gun plug-in {point.name}: {point.value}: {type(error).__name__}: {error}") from error
+        raise PluginError(f"gun plug-in {point.name}: {point.value}: {said_by(error)}") from error
     return cast("Callable[..., object]", make)
 
 

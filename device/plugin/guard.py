@@ -28,6 +28,8 @@ from device.words import (
     is_finite,
     is_whole_number,
     judged,
+    line_of,
+    said_by,
 )
 
 ANSWER_S, DISARM_S = 5.0, 2.0
@@ -40,6 +42,8 @@ CLOCK_SLACK_S = 0.001
 """So much a plug-in's times may lie outside of what this machine's clock allows. Assumed."""
 LENGTH_SLACK_S, LENGTH_SLACK_PART = 0.0002, 0.02
 """So much a pulse may be longer or shorter than ordered: as on the wire, where more is told as late or cut."""
+MOST_SHOTS = 10**12
+"""No gun counts so many."""
 LONGEST_READY_S = 60.0
 """So far ahead a plug-in may put its next shot: as long as the limit of shots a minute can make one wait."""
 
@@ -47,7 +51,11 @@ _Answer = TypeVar("_Answer")
 
 
 class PluginError(LinkError):
-    """A plug-in that is refused, that broke off, did not answer in time, or says what cannot be."""
+    """A plug-in that is refused, that broke off, or says what cannot be."""
+
+
+class PluginSilent(PluginError):  # noqa: N818 - what is so
+    """A plug-in that did not answer in time, and is asked for nothing more but to disarm."""
 
 
 def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
@@ -60,7 +68,7 @@ def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
         except Exception as error:  # noqa: BLE001 - raised again where it is waited for
             done.set_exception(error)
         except BaseException as error:  # noqa: BLE001 - SystemExit and the like end no program of ours
-            done.set_exception(RuntimeError(repr(error)))
+            done.set_exception(RuntimeError(f"it tried to end the program ({said_by(error)})"))
 
     threading.Thread(target=carry_out, daemon=True, name="plug-in").start()
     wait([done], seconds)
@@ -103,7 +111,8 @@ class GuardedGun:
         try:
             self._check_disarmed("when it is opened; a gun is born disarmed")
         except LinkError:
-            self._let_go()
+            self._closed = True
+            self._ask("close", self._gun.close)
             raise
 
     def identify(self) -> Identity:
@@ -159,30 +168,33 @@ class GuardedGun:
         return found
 
     def close(self) -> None:
-        """Disarm, and let go of the gun."""
-        if self._closed:
-            return
+        """Disarm, and let go of the gun: at once, whatever another thread asks of it."""
+        with self._told:
+            if self._closed:
+                return
+            self._closed = True
         try:
             self.disarm()
         finally:
-            self._let_go()
+            self._ask("close", self._gun.close)
 
     # what is asked of the plug-in
 
     def _ask(self, what: str, act: Callable[[], _Answer], seconds: float = ANSWER_S) -> _Answer:
         """One call, with its deadline. `PluginError`: it broke off or is silent; then it is asked no more."""
         if self._silent and what != "disarm":
-            raise PluginError(f"gun plug-in {self.name} never answered {self._silent}; switch off the gun, start anew")
+            raise PluginSilent(f"gun plug-in {self.name} never answered {self._silent}; switch off the gun, start anew")
         try:
             return answer_within(seconds, act)
-        except (LimitError, LinkError):
-            raise
+        except LimitError as error:
+            raise LimitError(f"gun plug-in {self.name}: {line_of(error)}") from error
+        except LinkError as error:
+            raise PluginError(f"gun plug-in {self.name}: {line_of(error)}") from error
         except TimeoutError as error:
             self._silent = self._silent or what
-            raise PluginError(f"gun plug-in {self.name}: {what}: {error}") from error
+            raise PluginSilent(f"gun plug-in {self.name}: {what}: {error}") from error
         except Exception as error:
-            said = f"{type(error).__name__}: {error}"
-            raise PluginError(f"gun plug-in {self.name} broke off in {what}: {said}") from error
+            raise PluginError(f"gun plug-in {self.name} broke off in {what}: {said_by(error)}") from error
 
     def _disarm_it(self) -> None:
         self._ask("disarm", self._gun.disarm, DISARM_S)
@@ -191,10 +203,6 @@ class GuardedGun:
         state = _checked_status(self.name, self._ask("status", self._gun.status), self._clock()).state
         if state in {"armed", "resetting"} and not self._armed:
             raise PluginError(f"gun plug-in {self.name} says that it is {state} {when}")
-
-    def _let_go(self) -> None:
-        self._closed = True
-        self._ask("close", self._gun.close)
 
     def _identity(self, said: object) -> Identity:
         if isinstance(said, Identity) and all(map(_is_text, (said.model, said.version, said.serial))):
@@ -307,8 +315,10 @@ def _checked_status(name: str, said: object, now_s: float) -> GunStatus:
         broken = f"{said!r}; it must be a GunStatus"
     elif said.state not in _STATES:
         broken = f"state {said.state!r}; it must be one of {', '.join(_STATES)}"
-    elif not (is_whole_number(said.shots) and said.shots >= 0):
-        broken = f"shots {said.shots!r}; it must be a whole number of at least 0"
+    elif not (is_whole_number(said.shots) and 0 <= said.shots < MOST_SHOTS):
+        broken = f"shots {said.shots!s:.20}; it must be a whole number of at least 0"
+    elif not (said.fault is None or (_is_text(said.fault) and said.state == "fault")):
+        broken = f"fault {said.fault!r} in state {said.state}; it must be None, or a line of text in state fault"
     elif not is_finite(said.coil_temperature_C):
         broken = f"coil_temperature_C {said.coil_temperature_C!r}; it must be finite"
     elif not (said.ready_at_s == -math.inf or is_finite(said.ready_at_s)) or said.ready_at_s > now_s + LONGEST_READY_S:

@@ -23,7 +23,7 @@ from device.sensor.process import (
     ShotAsked,
 )
 from device.sensor.streams import CsvSensor, Sensor, SensorError, checked_samples
-from device.words import DeviceError
+from device.words import DeviceError, line_of, said_by
 
 READ_EVERY_S = 0.005, 0.015
 """It is read at uneven times: a sensor whose batches come evenly would else always be heard equally late."""
@@ -62,14 +62,18 @@ def _read(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> float
     silence.ask()
     try:
         said: object = sensor.read()
-    except DeviceError:
-        raise
+    except DeviceError as error:
+        raise SensorError(line_of(error)) from error
     except BaseException as error:  # SystemExit too
-        raise SensorError(f"it broke off: {type(error).__name__}: {error}") from error
+        raise SensorError(f"it broke off: {said_by(error)}") from error
     samples = checked_samples("read", said, buffer.last_s)
     silence.answered(len(samples))
     buffer.take(samples, time.monotonic())
     return asked_s
+
+
+_WHY = {False: "is it on?", True: "does its time go, in seconds?"}
+"""What to ask of a sensor that gave too little, by whether it gave anything."""
 
 
 def _become_ready(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> None:
@@ -77,10 +81,12 @@ def _become_ready(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) 
     while buffer.length_s < SAMPLES_S:
         _read(sensor, buffer, silence)
         if time.monotonic() > end_s:
-            raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s; is it on?")
+            heard = buffer.length_s > 0
+            raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s: {_WHY[heard]}")
         time.sleep(_RANDOM.uniform(*READ_EVERY_S))
     if buffer.rate_Hz < LEAST_RATE_HZ:
-        raise SensorError(f"it gives {buffer.rate_Hz:.0f} samples a second; at least {LEAST_RATE_HZ:g} are needed")
+        rate = f"it gives {buffer.rate_Hz:.0f} samples a second of its time; at least {LEAST_RATE_HZ:g} are needed"
+        raise SensorError(f"{rate}: is its time in seconds?")
 
 
 def _watch(sensor: Sensor, silence: SensorSilence, out: int) -> None:

@@ -14,7 +14,7 @@ from typing import cast
 
 from device.plugin.door import SENSOR_PLUGINS, check_commands, entry_of
 from device.sensor.streams import CsvSensor, Sensor, SensorError
-from device.words import DeviceError
+from device.words import DeviceError, said_by
 
 SENSOR_COMMANDS = {"read": 0, "close": 0}
 """What a sensor has, and how many parameters each is called with."""
@@ -30,13 +30,13 @@ def open_sensor(address: str, clock: Callable[[], float]) -> Sensor:
     try:
         make = point.load()
     except BaseException as error:  # SystemExit too
-        raise SensorError(f"{who}: its import failed: {type(error).__name__}: {error}") from error
+        raise SensorError(f"{who}: its import failed: {said_by(error)}") from error
     try:
         sensor: object = make(rest, clock)
     except DeviceError:
         raise
     except Exception as error:
-        raise SensorError(f"{who} did not open {rest!r}: {type(error).__name__}: {error}") from error
+        raise SensorError(f"{who} did not open {rest!r}: {said_by(error)}") from error
     check_commands(who, sensor, SENSOR_COMMANDS, "a sensor")
     return cast("Sensor", sensor)
 

@@ -101,7 +101,7 @@ class SensorLink:
                 raise SensorError(f"{self.address}: spoke of a shot before it was ready")
         except queue.Empty:
             self.close()
-            why = f"was not ready within {start_s:g} s; did its import or its device hang?"
+            why = f"was not ready within {start_s:g} s; did its import, its device or a read hang?"
             raise SensorError(f"{self.address}: {why}") from None
         except BaseException:
             self.close()

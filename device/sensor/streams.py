@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -119,6 +120,9 @@ class CsvSensor:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_NOCTTY", 0))
         except OSError as error:
             raise SensorError(f"cannot be opened ({error.strerror})") from error
+        if stat.S_ISDIR(os.fstat(self._descriptor).st_mode):
+            os.close(self._descriptor)
+            raise SensorError("is a folder; it must be a file that grows, a pipe or a device")
         with suppress(OSError):  # a pipe has no end to go to
             os.lseek(self._descriptor, 0, os.SEEK_END)
         self._rest, self._last_s, self._in_a_row = b"", -np.inf, 0

@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, wait
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import metadata
 from itertools import pairwise
@@ -29,9 +29,10 @@ from pydantic import TypeAdapter
 
 from device import DeviceError, open_gun
 from device.parameters import GunParameters
-from device.plugin.conformance import conformance, rig_at
+from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
+from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
 from device.plugin.guard import PluginError
-from device.serial_gun.gun import speed_of
+from device.serial_gun.gun import SCHEME, speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
 from experiments.catalogues.messages import NAMED_ANSWERS
@@ -263,8 +264,10 @@ def _disk(results: Path) -> tuple[DoctorFinding, ...]:
 
 
 def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
+    ours = address == "simulated" or address.startswith(SCHEME)
+    seconds = DEADLINE_S if ours else DEADLINE_S + IMPORT_S + PLUGIN_OPEN_S
     try:
-        return (verdicts.of_link(within_seconds(DEADLINE_S, partial(gun_line, address)), limit_s),)
+        return (verdicts.of_link(within_seconds(seconds, partial(gun_line, address)), limit_s),)
     except PluginError as error:
         return (verdicts.of_failure("gun", str(error)),)
     except (DeviceError, OSError) as error:
@@ -279,12 +282,15 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
     """What every gun keeps, tried on this one."""
     try:
         rig = rig_at(address, trials=trials)
-        kept = within_seconds((trials + 20) * SHOT_S + DEADLINE_S, lambda: conformance(rig))
+        guns, found = OpenedGuns(rig.open_gun), list[ConformanceFinding]()
+        rig = replace(rig, open_gun=guns.open)
+        within_seconds((trials + 20) * SHOT_S + DEADLINE_S, lambda: conformance(rig, found.append), guns.let_go)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
-    except OSError as error:
-        return (verdicts.of_failure("shots", str(error)),)
-    return (verdicts.of_conformance(kept),)
+    except TimeoutError as error:
+        late = ConformanceFinding(check="time", kept=False, said=f"{error}; switch off the gun's power")
+        return (verdicts.of_conformance((*found, late)),)
+    return (verdicts.of_conformance(found),)
 
 
 def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[DoctorFinding, ...]:
@@ -350,8 +356,15 @@ _Result = TypeVar("_Result")
 PUT_AWAY_S = 2.0
 
 
-def within_seconds(seconds: float, work: Callable[[], _Result]) -> _Result:
-    """The result of some work, or what it raises. `TimeoutError` if it takes longer; it is then left to itself."""
+def _nothing() -> None:
+    """There is nothing to stop."""
+
+
+def within_seconds(seconds: float, work: Callable[[], _Result], stop: Callable[[], None] = _nothing) -> _Result:
+    """The result of some work, or what it raises. `TimeoutError` if it takes longer; it is then left to itself.
+
+    `stop` is called first where it is given up, also by an interrupt.
+    """
     done: Future[_Result] = Future()
 
     def carry_out() -> None:
@@ -364,9 +377,11 @@ def within_seconds(seconds: float, work: Callable[[], _Result]) -> _Result:
         threading.Thread(target=carry_out, daemon=True, name="check").start()
         wait([done], seconds)
     except KeyboardInterrupt:
+        stop()
         wait([done], PUT_AWAY_S)  # so that it can close and remove what it opened
         raise
     if not done.done():
+        stop()
         raise TimeoutError(f"did not end within {seconds:g} s")
     return done.result()
 
