@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import math
+import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,8 @@ from experiments.delivered import recorder
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
-from experiments.record.journal import Contents, read_journal
+from experiments.record import storage
+from experiments.record.journal import Contents, ending_of, read_journal
 from experiments.run import UNMEASURED, Finished, run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
@@ -331,6 +334,21 @@ def test_a_run_goes_on_when_its_sensor_is_silent_or_ends_which_is_said_once(tmp_
     ]
     assert set(notes) <= set(told)
     assert len(told) == len(notes) + 2  # a line for each shot without a peak
+
+
+def test_the_last_word_of_a_sensor_is_in_the_table_and_in_the_hash_however_slow_the_disk(tmp_path, monkeypatch):
+    write_all = storage.write_all
+
+    def slow(descriptor: int, data: bytes) -> None:
+        time.sleep(0.02)
+        write_all(descriptor, data)
+
+    monkeypatch.setattr(storage, "write_all", slow)
+    contents, _ = run_faltering(monkeypatch, tmp_path, short_design(), "p")  # it notes something at the end
+    assert "Lines of the sensor" in str(contents.records[-2].body)
+    of_table, of_journal = ending_of(contents.path.read_bytes())
+    assert of_table
+    assert of_journal == sha256(b"".join(contents.path.read_bytes().splitlines(keepends=True)[:-1])).hexdigest()
 
 
 @pytest.mark.parametrize(("sensor", "notes"), [("", [UNMEASURED]), ("simulated", [])])

@@ -197,6 +197,10 @@ class Journal:
         times = {"monotonic_s": self._clock.now(), "utc": self._clock.utc()}
         return self._writer.submit(self._write, {"kind": kind, **times, **body})
 
+    def catch_up(self) -> None:
+        """Return when all that was submitted is written, or was refused, of which whoever submitted it is told."""
+        self._writer.submit(_nothing_more).result()
+
     def _write(self, record: dict[str, object]) -> None:
         if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
             raise JournalGone(self._gone)
@@ -251,6 +255,10 @@ class Journal:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _nothing_more() -> None:
+    """What is written last."""
 
 
 def _written_again(path: Path, data: bytes) -> bool:
