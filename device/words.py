@@ -89,17 +89,23 @@ class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
 
 
+AWAKE_S = 0.2
+"""Who may wait long looks up so often. On Linux a thread that is being started may take a signal that was meant for the
+main thread, which then sleeps on: Ctrl+C would do nothing until it wakes.
+"""
+
+
 def said_by(error: BaseException) -> str:
     r"""What an exception of somebody else's code says, on one line that can be shown and written down.
 
     >>> said_by(ValueError("no\n\x1b[2Jcard\udcff")), said_by(SystemExit())
     ('ValueError: no \\x1b[2Jcard\\udcff', 'SystemExit')
     """
-    text = line_of(error)
+    text = error_line(error)
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def line_of(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """The same without the kind of exception; empty where it says nothing."""
     try:
         text = " ".join(str(error).split())

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Protocol
+
+from device.words import AWAKE_S
 
 
 class Clock(Protocol):
@@ -51,8 +54,10 @@ class RealClock:
             time.sleep(seconds / self._speed)
 
     def wait(self, news: threading.Condition, seconds: float | None) -> None:
-        """Wait for news for real."""
-        news.wait(None if seconds is None else max(0.0, seconds / self._speed))
+        """Wait for news for real; interrupts come through."""
+        end_s = math.inf if seconds is None else time.monotonic() + seconds / self._speed
+        while not news.wait(min(AWAKE_S, max(0.0, end_s - time.monotonic()))) and time.monotonic() < end_s:
+            pass
 
     def go_on_after(self, utc: str) -> None:
         """The machine's date and time are what they are, earlier ones too."""

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from analysis.report.terminal import say
 from device.serial_gun.gun import speed_of
 from device.words import few_of_each
 from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
@@ -80,7 +81,7 @@ def _markers(results: Path, say: Callable[[str], None]) -> AbstractContextManage
 
 def _say(text: str) -> None:
     with suppress(OSError):  # where the terminal is gone, nobody reads it
-        sys.stderr.write(f"recoil: {text}\n")
+        say(f"recoil: {text}")
 
 
 def _say_beforehand(request: RunRequest) -> None:

@@ -18,8 +18,8 @@ _NAMED = re.compile(r"(\{\w+\})")
 _ACCENTS = str.maketrans("aceinouyACEINOUY", "áçéïñöüýÅÇÉÎÑÖÛÝ")
 _ARABIC = str.maketrans("abcdefghijklmnopqrstuvwxyz", "ابثدهفغحيجكلمنوپقرستعوخصيز")
 HEADS = {
-    LONG: {NAME: "long", FONTS: "Noto Sans", DIRECTION: "ltr", CHECKED_BY: "a test"},
-    RIGHT_TO_LEFT: {NAME: "turned", FONTS: "DejaVu Sans", DIRECTION: "rtl", CHECKED_BY: "a test"},
+    LONG: {NAME: "long", FONTS: "Noto Sans", DIRECTION: "ltr", CHECKED_BY: "a test, 2026-01-31"},
+    RIGHT_TO_LEFT: {NAME: "turned", FONTS: "DejaVu Sans", DIRECTION: "rtl", CHECKED_BY: "a test, 2026-01-31"},
 }
 
 

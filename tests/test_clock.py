@@ -1,9 +1,12 @@
+import threading
 import time
 from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from experiments.clock import RealClock, VirtualClock
+from tests.stolen_signal import Told, stolen_signal
+from tests.waiting import PATIENCE_S
 
 
 def moment(text: str) -> datetime:
@@ -69,3 +72,24 @@ def test_a_virtual_clock_goes_on_after_the_run_that_stopped_ahead_of_it() -> Non
     for earlier in ("2001-01-01T00:00:00.000000Z", "yesterday", ""):
         clock.go_on_after(earlier)
     assert clock.utc() == "2999-01-02T03:04:05.000006Z"
+
+
+def test_a_signal_that_another_thread_takes_wakes_who_waits_for_news():
+    news = threading.Condition()
+    with stolen_signal(), pytest.raises(Told), news:
+        RealClock().wait(news, PATIENCE_S)
+
+
+def test_news_end_a_wait_at_once_and_time_ends_it_in_time():
+    news, clock = threading.Condition(), RealClock()
+    with news:
+        start_s = clock.now()
+        clock.wait(news, 0.5)
+        assert clock.now() - start_s >= 0.5
+
+        def tell() -> None:
+            with news:
+                news.notify_all()
+
+        threading.Thread(target=tell, daemon=True).start()
+        clock.wait(news, None)

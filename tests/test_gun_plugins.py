@@ -44,6 +44,7 @@ from experiments.session.states import EMERGENCY
 from tests.conftest import RECOIL
 from tests.firmware import emulated
 from tests.gun_plugins import ROOT, install, install_sound_card
+from tests.stolen_signal import Told, stolen_signal
 from tests.twins import a_shot, a_twin
 from tests.waiting import PATIENCE_S, wait_for
 
@@ -422,6 +423,11 @@ def test_a_plug_in_that_breaks_off_is_a_link_that_failed(clock, acts):
     with pytest.raises(PluginError, match="gun plug-in liar"):
         gun.fire(a_shot())
     assert not liar.is_armed
+
+
+def test_a_signal_that_another_thread_takes_wakes_who_waits_for_a_plug_in():
+    with stolen_signal(), pytest.raises(Told):
+        guard.answer_within(PATIENCE_S, threading.Event().wait)
 
 
 def test_a_plug_in_that_is_silent_is_asked_no_more_but_still_disarmed(clock, monkeypatch):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -20,6 +23,7 @@ from experiments.watch.markers import KEY_S, RECORD_S, Marker, RunMarkers
 from tests.at_runs import shorten
 from tests.at_terminal import DAMPER, ENDS, FIRES, AtTerminal
 from tests.conftest import RECOIL, Recoil
+from tests.gun_plugins import ROOT
 from tests.journals import forged, raw
 from tests.kills import words
 from tests.recorder import markers_process, recorded, recording
@@ -139,6 +143,8 @@ ResolveScope = machine
     [
         ("raise ImportError('no pylsl')", "", "no Lab Streaming Layer here (no pylsl): install the extra `lsl`"),
         ("raise RuntimeError('no binary')", "", "no Lab Streaming Layer here (no binary): install the extra `lsl`"),
+        ("raise SystemExit", "", "the package pylsl is broken (SystemExit): install the extra `lsl`"),
+        ("IRREGULAR_RATE = 0.0", "", "pylsl.py: is not what it should be (AttributeError: module 'pylsl' has no"),
         ("", DEAF, "the streams are not found on this machine's own network"),
     ],
 )
@@ -380,6 +386,33 @@ def test_one_bad_entry_is_named_and_silences_no_other_run(journal: Path, whole: 
     assert names(feed) == ["begin"]
     feed.find()
     assert [line.partition(":")[0] for line in said] == [str(results / "sub-P00"), str(other)]
+
+
+@pytest.mark.slow
+def test_a_library_that_hangs_outlives_no_run(tmp_path: Path) -> None:
+    (tmp_path / "pylsl.py").write_text("import time\ntime.sleep(3600)\n")
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    command = [sys.executable, "-m", "experiments.watch.markers_process", str(tmp_path)]
+    with subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdin is not None
+        child.stdin.close()  # as at the end of a run, however it ends
+        assert child.wait(PATIENCE_S) == 1
+
+
+@pytest.mark.slow
+def test_a_name_that_is_no_text_ends_no_markers(tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"sub-\xff")
+    folder.mkdir()
+    (folder / f"{folder.name}_task-direction_journal.jsonl").symlink_to("nowhere")
+    with subprocess.Popen(
+        [RECOIL, "markers", str(tmp_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as child:
+        assert child.stdout is not None
+        assert "Streams" in child.stdout.readline()
+        child.send_signal(signal.SIGINT)
+        _, said = child.communicate(timeout=PATIENCE_S)
+    assert "cannot be read (No such file or directory)" in said
+    assert "Traceback" not in said
 
 
 def test_a_folder_that_cannot_be_read_is_said_once(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The gun's core, as `PROTOCOL.md` says it: by hand, in frames, in its states, and left alone."""
 
+import socket
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,8 @@ from device.twin.machine import REFUSED, DriveEvent
 from device.twin.twin import Pty
 from device.wire.records import Frame, ShotRecord, decode, encode, following, refusal_in
 from tests.twin_hosts import PULSE, READY, Hand, Strict
+from tests.twins import a_twin
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture
@@ -256,3 +259,22 @@ def test_a_file_where_the_link_is_to_be_is_refused_and_kept(tmp_path: Path) -> N
         line.plug()
     line.unplug()
     assert precious.read_bytes() == b"kept"
+
+
+def test_what_a_host_on_tcp_has_half_said_or_was_to_be_told_is_nothing_to_the_next(tmp_path: Path) -> None:
+    with a_twin(tmp_path, tcp=True) as (_, plug):
+        place = plug.address.removeprefix("socket://").split(":")
+
+        def host() -> socket.socket:
+            return socket.create_connection((place[0], int(place[1])), timeout=PATIENCE_S)
+
+        with host() as first:
+            first.sendall(b"*IDN?\n" * 300 + f"{PULSE}\nAR".encode())
+        with host() as second:
+            second.sendall(b"M\nSTAT?\n")
+            assert second.makefile("rb").readline().startswith(b"STAT DISARMED")
+        with host() as third:
+            third.sendall(b"TRI")
+        with host() as fourth:
+            fourth.sendall(b"*IDN?\n")
+            assert fourth.makefile("rb").readline().startswith(b"Recoil,haptic-gun")

@@ -21,7 +21,7 @@ from typing import cast
 
 from device.methods import Method
 from device.plugin.guard import GuardedGun, PluginError, answer_within
-from device.words import Gun, LinkError, line_of, said_by
+from device.words import Gun, LinkError, error_line, said_by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +118,7 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     try:
         gun = answer_within(PLUGIN_OPEN_S, lambda: make(rest, dict(methods), clock))
     except LinkError as error:
-        raise PluginError(f"{address}: {line_of(error)}") from error
+        raise PluginError(f"{address}: {error_line(error)}") from error
     except Exception as error:
         raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}") from error
     check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")

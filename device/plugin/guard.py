@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, wait
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from typing import TypeVar
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method, Rendering, rendering_of
 from device.words import (
+    AWAKE_S,
     Gun,
     GunStatus,
     Identity,
@@ -25,10 +27,10 @@ from device.words import (
     Pulse,
     Shot,
     ShotReport,
+    error_line,
     is_finite,
     is_whole_number,
     judged,
-    line_of,
     said_by,
 )
 
@@ -71,10 +73,17 @@ def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
             done.set_exception(RuntimeError(f"it tried to end the program ({said_by(error)})"))
 
     threading.Thread(target=carry_out, daemon=True, name="plug-in").start()
-    wait([done], seconds)
+    wait_awake(done, seconds)
     if not done.done():
         raise TimeoutError(f"no answer within {seconds:g} s")
     return done.result()
+
+
+def wait_awake(done: Future[_Answer], seconds: float) -> None:
+    """Wait for a result, at most for so long; interrupts come through."""
+    end_s = time.monotonic() + seconds
+    while not done.done() and (left_s := end_s - time.monotonic()) > 0:
+        wait([done], min(left_s, AWAKE_S))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,9 +196,9 @@ class GuardedGun:
         try:
             return answer_within(seconds, act)
         except LimitError as error:
-            raise LimitError(f"gun plug-in {self.name}: {line_of(error)}") from error
+            raise LimitError(f"gun plug-in {self.name}: {error_line(error)}") from error
         except LinkError as error:
-            raise PluginError(f"gun plug-in {self.name}: {line_of(error)}") from error
+            raise PluginError(f"gun plug-in {self.name}: {error_line(error)}") from error
         except TimeoutError as error:
             self._silent = self._silent or what
             raise PluginSilent(f"gun plug-in {self.name}: {what}: {error}") from error

@@ -23,7 +23,7 @@ from device.sensor.process import (
     ShotAsked,
 )
 from device.sensor.streams import CsvSensor, Sensor, SensorError, checked_samples
-from device.words import DeviceError, line_of, said_by
+from device.words import DeviceError, error_line, said_by
 
 READ_EVERY_S = 0.005, 0.015
 """It is read at uneven times: a sensor whose batches come evenly would else always be heard equally late."""
@@ -63,7 +63,7 @@ def _read(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> float
     try:
         said: object = sensor.read()
     except DeviceError as error:
-        raise SensorError(line_of(error)) from error
+        raise SensorError(error_line(error)) from error
     except BaseException as error:  # SystemExit too
         raise SensorError(f"it broke off: {said_by(error)}") from error
     samples = checked_samples("read", said, buffer.last_s)

@@ -72,6 +72,10 @@ class Core:
             self._run_due(now_us)
         return self._taken()
 
+    def forget_line(self) -> None:
+        """Drop the line that was begun."""
+        self._splitter = records.Splitter()
+
     def fail(self, fault: int, now_us: int) -> tuple[bytes, list[DriveEvent]]:
         """The board's driver reports a fault, by its number above 0."""
         self._run_due(now_us)

@@ -90,9 +90,10 @@ _DAMAGES = {"lose": _lose, "double": _double, "corrupt": _corrupt, "partial": _p
 
 
 class Socket(Protocol):
-    """The gun's end of the line."""
+    """The gun's end of the line. `hosts` counts those that came, where it can be told that it is another one."""
 
     address: str
+    hosts: int
 
     def plug(self) -> None:
         """Be there, at the same address as before."""
@@ -109,6 +110,8 @@ class Socket(Protocol):
 
 class Pty:
     """A pseudo-terminal; `link` is a path that leads to it and stays the same when it is plugged in again."""
+
+    hosts = 0
 
     def __init__(self, link: Path | None = None) -> None:
         self._link = link
@@ -166,7 +169,7 @@ class Tcp:
         self._port = port
         self._listening: socket.socket | None = None
         self._host: socket.socket | None = None
-        self.address = ""
+        self.address, self.hosts = "", 0
 
     def plug(self) -> None:
         """Listen. `OSError`: the port is taken."""
@@ -206,6 +209,7 @@ class Tcp:
         if self._host is not None:
             self._host.close()
         self._host, _ = listening.accept()
+        self.hosts += 1
         self._host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._host.setblocking(False)
 
@@ -320,6 +324,7 @@ class Twin:
         self._going: deque[tuple[float, bytes]] = deque()
         self._planned: list[tuple[float, Callable[[], None]]] = []
         self.hangs_until_s = 0.0
+        self._hosts = 0
         self._stop = Event()
         self._thread: Thread | None = None
 
@@ -355,6 +360,8 @@ class Twin:
     def once(self) -> None:
         """Wait until something may happen, at most 20 ms, and let it happen."""
         data = self._socket.read(self._wait_s())
+        if self._socket.hosts != self._hosts:
+            self._meet_host()
         if data:
             self._post(self._coming, data)
         now_s = time.monotonic()
@@ -365,6 +372,13 @@ class Twin:
         self._step(b"" if hangs else b"".join(_due(self._coming, now_s)))
         for piece in _due(self._going, now_s):
             self._socket.write(piece)
+
+    def _meet_host(self) -> None:
+        """Another host: what the one before had half said, or was still to be told, is not for this one."""
+        self._hosts = self._socket.hosts
+        self._coming.clear()
+        self._going.clear()
+        self.core.forget_line()
 
     def order(self, act: Callable[[], None]) -> None:
         """Have something done by the thread that serves: `unplug` or `reset`, now."""

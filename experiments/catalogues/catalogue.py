@@ -13,6 +13,7 @@ import re
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import date
 from functools import partial
 from pathlib import Path
 
@@ -27,12 +28,10 @@ NAME, FONTS, DIRECTION, CHECKED_BY = "X-Language-Name", "X-Fonts", "X-Direction"
 """The entries in the head of a catalogue that say what gettext does not ask for."""
 NOBODY = "nobody"
 """What the last of them says, where no native speaker has checked the catalogue."""
-_NO_NAMES = re.compile(
-    r"(?:nobody|no[ -]?one|none|not|n/a|to ?do|tb[ad]|fixme|unknown|unchecked|your name|full name)\b",
-    re.IGNORECASE,
-)
-"""How what is no name begins that stands in its place."""
+_CHECKED = re.compile(r"(.*\w.*?),?\s+(\d{4}-\d{2}-\d{2})")
+"""Who checked a catalogue, and on which day: what only fills the place has no day."""
 _COMPILED = ".mo"
+_MOST_BYTES = 1 << 22
 
 
 def _nothing(_: str) -> str:
@@ -43,8 +42,8 @@ def _nothing(_: str) -> str:
 class Language:
     """A language, as a run uses it. `fonts`: families, of which one must have all letters; the first that does is used.
 
-    `checked_by`: which native speaker checked it; empty if none did. `look_up` gives a text in this language, empty if
-    there is none.
+    `checked_by`: which native speaker checked it, and when; empty if none did. `look_up` gives a text in this language,
+    empty if there is none.
     """
 
     code: str
@@ -116,6 +115,8 @@ class _Absent(gettext.NullTranslations):
 def _read(code: str, path: Path) -> Language:
     if not path.is_file():
         raise ConfigError(f"{path}: is no file")
+    if path.stat().st_size > _MOST_BYTES:
+        raise ConfigError(f"{path}: is longer than {_MOST_BYTES >> 20} MiB, as no catalogue is")
     try:
         return _language(code, *(_compiled(path) if path.suffix == _COMPILED else _of_source(path)))
     except OSError as error:
@@ -166,10 +167,21 @@ def _printed(translate: Callable[[str], str], text: str) -> str:
     return found
 
 
-def _checker(name: str) -> str:
-    """Who checked a catalogue; empty for what is no name: it has fewer than two letters, or says that nobody did."""
-    letters = sum(map(str.isalpha, name))
-    return "" if letters < 2 or _NO_NAMES.match(name.strip(" <([")) else name
+def _checker(said: str) -> str:
+    """Who checked a catalogue and when; empty where nobody did. `ValueError`: it says something else."""
+    if said.lower() in ("", NOBODY):
+        return ""
+    found = _CHECKED.fullmatch(said)
+    try:
+        if found is not None and found[1].lower() != NOBODY:
+            date.fromisoformat(found[2])
+            return said
+    except ValueError:
+        pass
+    raise ValueError(
+        f"{CHECKED_BY}: {said}; it must be {NOBODY}, or the initials or role of the native speaker who checked it and "
+        "the day, as in `A. B., 2026-02-28`"
+    )
 
 
 def _language(code: str, head: Mapping[str, str], say: Callable[[str], str]) -> Language:

@@ -16,7 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, wait
+from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -31,7 +31,7 @@ from device import DeviceError, open_gun
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
-from device.plugin.guard import PluginError
+from device.plugin.guard import PluginError, wait_awake
 from device.serial_gun.gun import SCHEME, speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
@@ -375,10 +375,10 @@ def within_seconds(seconds: float, work: Callable[[], _Result], stop: Callable[[
 
     try:
         threading.Thread(target=carry_out, daemon=True, name="check").start()
-        wait([done], seconds)
+        wait_awake(done, seconds)
     except KeyboardInterrupt:
         stop()
-        wait([done], PUT_AWAY_S)  # so that it can close and remove what it opened
+        wait_awake(done, PUT_AWAY_S)  # so that it can close and remove what it opened
         raise
     if not done.done():
         stop()

@@ -32,6 +32,8 @@ Kind = Literal["run", "step", "outcome", "shot", "remark", "measured", "resumed"
 _KINDS = get_args(Kind)
 ENDING = "_journal.jsonl"
 """How the name of every journal ends."""
+MOST_LINE, MOST_BYTES = 1 << 26, 1 << 29
+"""No record is longer, and no journal: a run of ten thousand trials writes some ten million bytes."""
 _NOTHING = "nothing was recorded"
 _PATIENCE_S = 0.5
 """How long a journal is tried that somebody may only be looking at."""
@@ -363,14 +365,20 @@ def begun(path: Path) -> Contents | None:
 
 def head(path: Path) -> Head | None:
     """The first record of a journal; `None` if the run was killed before it was whole. Raises as `read_journal`."""
-    return head_of(path, journal_bytes(path))
+    return head_of(path, _first_bytes(path, MOST_LINE))
 
 
 def journal_bytes(path: Path) -> bytes:
     """The bytes of a journal. `JournalError` if there are none to be had."""
+    data = _first_bytes(path, MOST_BYTES)
+    if len(data) == MOST_BYTES:
+        raise JournalError(f"{path}: is longer than any run writes ({MOST_BYTES >> 20} MiB); it was changed")
+    return data
+
+
+def _first_bytes(path: Path, most: int) -> bytes:
     try:
-        with os.fdopen(storage.open_to_read(path), "rb") as file:
-            return file.read()
+        return storage.read(path, most)
     except OSError as error:
         raise JournalError(f"{path}: cannot be read ({error.strerror})") from error
 

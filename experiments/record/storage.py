@@ -78,6 +78,13 @@ for _flag in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"):
     _READ |= getattr(os, _flag, 0)
 
 
+def read(path: Path, most: int, start: int = 0) -> bytes:
+    """So many bytes of a file at most. `OSError` as of `open_to_read`."""
+    with os.fdopen(open_to_read(path), "rb") as file:
+        file.seek(start)
+        return file.read(most) or b""  # nothing: a file of the system that has nothing to say just now
+
+
 def pieces(path: Path, length: int) -> Iterator[bytes]:
     """The first bytes of a file, a piece at a time. `OSError` as of `open_to_read`."""
     with os.fdopen(open_to_read(path), "rb") as file:

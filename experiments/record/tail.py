@@ -7,15 +7,14 @@ every line before it: a file in which it is not found again was changed or cut w
 from __future__ import annotations
 
 import hashlib
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.record import storage
+from experiments.record import journal, storage
 from experiments.record.journal import JournalError, Record, head_of, link_of, record_of
 
-LOOK_BYTES = 1 << 26
-"""So much of a journal is read in one look; no record is longer."""
+LOOK_BYTES = journal.MOST_LINE
+"""So much of a journal is read in one look."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,13 +84,13 @@ class JournalTail:
             self._stamp = None if self._stamp is None else (self._stamp[0], self._stamp[1], _READ_ON)
 
     def _read_on(self) -> News:
-        with os.fdopen(storage.open_to_read(self.path), "rb") as file:
-            file.seek(self._length)
-            data = file.read(LOOK_BYTES)
+        data = storage.read(self.path, LOOK_BYTES, self._length)
         whole, more = data[: data.rfind(b"\n") + 1], len(data) == LOOK_BYTES
         self.cut_bytes = 0 if more else len(data) - len(whole)
         anew = self._count == 0
         try:
+            if not (self._count or whole) and data[:1] not in (b"", b"{"):
+                raise JournalError(f"{self.path}: line 1: no record, and no beginning of one; it was changed")
             if more and not whole:
                 raise JournalError(f"{self.path}: line {self._count + 1} is longer than any record; it was changed")
             records = tuple(map(self._next, whole.split(b"\n")[:-1]))

@@ -44,7 +44,8 @@ class Watched:
 def watched_folder(folder: Path) -> Path:
     """The results folder that is meant: a study's folder means its results. `PlaceError` if there is no such folder."""
     if not folder.is_dir():
-        raise PlaceError(f"{folder}: no such folder; name a results folder, or the folder of a study")
+        what = "is no folder" if os.path.lexists(folder) else "no such folder"
+        raise PlaceError(f"{folder}: {what}; name a results folder, or the folder of a study")
     return folder / "results" if (folder / "study.toml").is_file() else folder
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from device.words import RecoilError
+from device.words import RecoilError, error_line, said_by
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.watch.feed import MarkerFeed
 from experiments.watch.markers import DETAIL_COLUMNS, Marker
@@ -71,17 +71,22 @@ class MarkerOutlets:
     def __init__(self, source: str) -> None:
         try:
             import pylsl  # noqa: PLC0415 - an extra, used here alone
-        except Exception as error:  # no package, or one without its library, or broken
-            raise NoStreams(f"no Lab Streaming Layer here ({' '.join(str(error).split())}): {_INSTALL}") from error
+        except (ImportError, OSError, RuntimeError) as error:  # no package, or a package without its library
+            raise NoStreams(f"no Lab Streaming Layer here ({error_line(error)}): {_INSTALL}") from error
+        except (Exception, SystemExit) as error:  # something else by its name
+            raise NoStreams(f"the package pylsl is broken ({said_by(error)}): {_INSTALL}") from error
         self._lsl, self._source = pylsl, source
         try:
             self._outlets = [
                 pylsl.StreamOutlet(self._info(MARKERS_NAME, "Markers", ("marker",))),
                 pylsl.StreamOutlet(self._info(DETAILS_NAME, "Details", DETAIL_COLUMNS)),
             ]
+            self._clock, self._next_s = self._mapped(), 0.0
         except RuntimeError as error:
             raise NoStreams(f"Lab Streaming Layer makes no stream ({error}): look at this machine's network") from error
-        self._clock, self._next_s = self._mapped(), 0.0
+        except Exception as error:  # something else by its name
+            where = getattr(pylsl, "__file__", None) or "pylsl"
+            raise NoStreams(f"{where}: is not what it should be ({said_by(error)}): {_INSTALL}") from error
 
     def _info(self, name: str, kind: str, columns: Sequence[str]) -> StreamInfo:
         lsl = self._lsl
@@ -132,7 +137,7 @@ def quiet_library() -> Iterator[None]:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     os.close(nowhere)
-    sys.stderr = os.fdopen(said, "w", encoding="utf-8", buffering=1, closefd=False)
+    sys.stderr = os.fdopen(said, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
     try:
         yield
     finally:

@@ -8,15 +8,17 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from pathlib import Path
 from typing import IO
 
 from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
 
-READY_S = 20.0
-"""How long a run waits for the streams before it begins."""
+READY_S, _SOON_S = 20.0, 5.0
+"""How long a run waits for the streams before it begins, and after how long it says that it waits."""
 _END_S = 5.0
 """How long the streams have for what is still to be sent, and again to end when they are told to."""
 _ROOT = Path(__file__).parents[2]
@@ -41,9 +43,8 @@ def markers_beside(results: Path, say: Callable[[str], None]) -> Iterator[None]:
         say(f"no markers: {error}")
         yield
         return
-    lines = _lines(child)
-    _wait_ready(lines, say)
     try:
+        _wait_ready(_lines(child), say)
         yield
     finally:
         _end(child, say)
@@ -65,10 +66,16 @@ def _lines(child: subprocess.Popen[str]) -> queue.SimpleQueue[str]:
 
 def _wait_ready(lines: queue.SimpleQueue[str], say: Callable[[str], None]) -> None:
     try:
-        said = lines.get(timeout=READY_S)
+        with suppress(queue.Empty):
+            return _say_if_not(lines.get(timeout=_SOON_S), say)
+        say(f"the run waits for the streams of its markers, at most {READY_S:g} s")
+        _say_if_not(lines.get(timeout=READY_S - _SOON_S), say)
     except queue.Empty:
         say(f"no markers yet: their streams are not there after {READY_S:g} s; the run begins without them")
-        return
+
+
+def _say_if_not(said: str, say: Callable[[str], None]) -> None:
+    """What a child says that is not ready."""
     if said != _READY:
         say(said or "no markers: their process ended at once")
 
@@ -92,6 +99,8 @@ def _until_left(over: threading.Event) -> None:
     while os.read(0, 1024):  # not `sys.stdin`, whose lock the end of the program would wait for
         pass
     over.set()
+    time.sleep(2 * _END_S)
+    os._exit(1)  # the library hangs, and nobody is left who could end this
 
 
 def send_beside() -> int:
@@ -103,6 +112,10 @@ def send_beside() -> int:
 
     def tell(made: MarkerStreams) -> None:
         print(f"markers: {made.problem}" if made.problem else _READY, flush=True)  # noqa: T201 - to the run
+
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files may be no text
 
     def say(text: str) -> None:
         with suppress(OSError):  # where the terminal is gone, nobody reads it

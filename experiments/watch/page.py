@@ -15,7 +15,7 @@ from experiments.watch.runs import RunRow, SyncTimes, WatchedState, age_s
 
 PAGE_PARTS = ("summary", "open", "finished")
 """The parts of the page that change, by their ids."""
-PROBLEMS_SHOWN = 5
+PROBLEMS_SHOWN = 20
 """So many things that cannot be read are named on the page."""
 
 _SIGNS: dict[WatchedState, str] = {

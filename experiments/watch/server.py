@@ -28,8 +28,8 @@ REFUSED_AT_ONCE = 8
 """Of so many wrong tokens at a time each gets its answer; of more none does."""
 VIEWERS = 64
 """Connections at a time; of further ones none is served."""
-ASK_S = 10.0
-"""How long somebody may take to ask, or to read what they asked for."""
+ASK_S, TAKE_S = 2.0, 10.0
+"""How long somebody may take to ask, and to read what they asked for."""
 ALIVE_S = 1.0
 """How often a viewer to whom nothing is new is told that the page is alive."""
 NICE = 10
@@ -116,6 +116,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = ASK_S
 
     def do_GET(self) -> None:
+        self.connection.settimeout(TAKE_S)
         path = self._allowed()
         if path is None:
             return
@@ -180,7 +181,7 @@ class _Handler(BaseHTTPRequestHandler):
             number, parts = self.server.reader.after(number, ALIVE_S)
             news = [(name, part) for name, part, old in zip(PAGE_PARTS, parts, sent, strict=True) if part != old]
             text = "".join(f"event: {name}\ndata: {part}\n\n" for name, part in news)
-            self.wfile.write(text.encode(errors="replace") or b": alive\n\n")
+            self.wfile.write(text.encode(errors="replace") or b"event: alive\ndata:\n\n")
             sent = parts
 
     def _no_method(self) -> None:
