@@ -13,7 +13,8 @@ from analysis.report.terminal import Progress, with_tables
 from device.parameters import GunParameters
 from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
-from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
+from device.twin.sockets import Pty, Socket, Tcp
+from device.twin.twin import Make, Troubles, Twin
 from experiments.clock import RealClock
 from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.doctor.figures import DoctorFinding

@@ -11,7 +11,8 @@ from typing import Any
 
 from device.methods import paper_methods
 from device.serial_gun.gun import open_serial
-from device.twin.twin import Make, Pty, Twin
+from device.twin.sockets import Pty
+from device.twin.twin import Make, Twin
 from device.wire.records import Frame, Garbled, Setting, ShotRecord, Splitter, decode, encode
 from device.words import ShotTiming
 from tests.twins import PATIENT_S, Pair, host_clock, plugged_in

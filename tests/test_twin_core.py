@@ -7,7 +7,7 @@ import pytest
 
 from device.twin.core import Core
 from device.twin.machine import REFUSED, DriveEvent
-from device.twin.twin import Pty
+from device.twin.sockets import Pty
 from device.wire.records import Frame, ShotRecord, decode, encode, following, refusal_in
 from tests.twin_hosts import PULSE, READY, Hand, Strict
 from tests.twins import a_twin

@@ -16,7 +16,8 @@ from device.methods import paper_methods
 from device.serial_gun import lines, link
 from device.serial_gun.gun import SerialGun, open_serial
 from device.twin.machine import BOOT_REST_US
-from device.twin.twin import Make, Pty, Socket, Tcp, Troubles, Twin
+from device.twin.sockets import Pty, Socket, Tcp
+from device.twin.twin import Make, Troubles, Twin
 from device.wire.records import Garbled
 from device.words import LinkError
 

@@ -8,9 +8,7 @@ hash of that record's line (`link_of`): a record changed by hand breaks the chai
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -25,6 +23,7 @@ from experiments.clock import Clock
 from experiments.config.setup import sha256
 from experiments.design.plan import Plan
 from experiments.record import storage
+from experiments.record.lines import LineError, check_chain, link_of, parsed_line, record_line
 
 ParticipantKind = Literal["person", "synthetic"]
 """Who does a run."""
@@ -296,50 +295,6 @@ def _held(path: Path, descriptor: int) -> int:
     return descriptor
 
 
-def record_line(record: Mapping[str, object]) -> bytes:
-    """A record as JSON with its keys as they stand, so that the order of a design's factors is kept; no NaN."""
-    return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
-
-
-def link_of(line: bytes) -> str:
-    """What the next record says of a line: the first 16 digits of its SHA-256."""
-    return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
-
-
-def parsed_line(line: bytes) -> dict[str, object]:
-    """The JSON object on a line; else `JournalError`. NaN and halves of characters are no JSON that can be written."""
-    try:
-        value = json.loads(line.decode(), parse_constant=_no_number)
-        if b"\\u" in line:
-            json.dumps(value, ensure_ascii=False).encode()
-    except (ValueError, RecursionError) as error:
-        raise JournalError(f"not a JSON record ({_why_no_json(error)}); it was changed or damaged") from error
-    if not isinstance(value, dict):
-        raise JournalError("not a JSON object; it was changed or damaged")
-    return value
-
-
-def _why_no_json(error: ValueError | RecursionError) -> str:
-    """Why a line is no record; advice on Python is nothing to whoever reads a journal."""
-    if isinstance(error, RecursionError):
-        return "it nests too deep"
-    if isinstance(error, UnicodeDecodeError):
-        return f"byte {error.start} is not UTF-8"
-    return "a number has thousands of digits" if "integer string conversion" in str(error) else str(error)
-
-
-def _no_number(name: str) -> object:
-    raise ValueError(f"{name} is no number of JSON")
-
-
-def check_chain(value: dict[str, object], number: int, before: str) -> None:
-    """`JournalError` unless the record's number `n` and its `link` follow from the line before."""
-    if value.get("n") != number:
-        raise JournalError(f"record number is {value.get('n')!r}, must be {number}; a line was lost or added")
-    if value.get("link") != before:
-        raise JournalError(f"does not follow from line {number}, which was changed after it was written")
-
-
 def read_journal(path: Path) -> Contents:
     """Every whole record of a journal. A record is whole if its line has its end; the rest is counted, not read.
 
@@ -409,7 +364,7 @@ def ending_of(data: bytes) -> tuple[str, str]:
     The second is empty as well if any byte before the last record was changed. Much quicker than reading every record.
     """
     before, line = data[: data.rfind(b"\n", 0, -1) + 1], data[data.rfind(b"\n", 0, -1) + 1 :]
-    with suppress(JournalError):
+    with suppress(LineError):
         value = parsed_line(line)
         if value.get("kind") == "finished" and line.endswith(b"\n"):
             itself = hashlib.sha256(before).hexdigest()
@@ -463,8 +418,8 @@ def _values(path: Path, number: int, line: bytes, before: str) -> dict[str, obje
     try:
         value = parsed_line(line)
         if value.get("kind") not in _KINDS:
-            raise JournalError(f"kind must be one of {', '.join(_KINDS)}; it was changed or damaged")
+            raise LineError(f"kind must be one of {', '.join(_KINDS)}; it was changed or damaged")
         check_chain(value, number, before)
-    except JournalError as error:
+    except LineError as error:
         raise JournalError(f"{path}: line {number + 1}: {error}") from error
     return value

@@ -22,7 +22,8 @@ from experiments.config.door import Model, Text
 from experiments.config.findings import CODE
 from experiments.config.setup import canonical_json
 from experiments.record import storage
-from experiments.record.journal import JournalError, check_chain, link_of, parsed_line
+from experiments.record.journal import JournalError
+from experiments.record.lines import LineError, check_chain, link_of, parsed_line
 from experiments.study.study import Facts, Member
 
 REGISTER_FILE = "participants.jsonl"
@@ -163,7 +164,7 @@ def read_register(results: Path) -> Register:
     for number, line in enumerate(data[: data.rfind(b"\n") + 1].split(b"\n")[:-1]):
         try:
             found = _with_line(found, number, line)
-        except JournalError as error:
+        except (JournalError, LineError) as error:
             return replace(found, problem=f"{path}: line {number + 1}: {error}; {_DAMAGED}")
     return found
 

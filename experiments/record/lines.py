@@ -1,0 +1,57 @@
+"""A line of a journal or register: a JSON object with its number and the hash of the line before. Pure."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+
+from device.words import RecoilError
+
+
+class LineError(RecoilError):
+    """A line that is no record, or does not follow from the one before; the message has no place."""
+
+
+def record_line(record: Mapping[str, object]) -> bytes:
+    """A record as JSON with its keys as they stand, so that the order of a design's factors is kept; no NaN."""
+    return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def link_of(line: bytes) -> str:
+    """What the next record says of a line: the first 16 digits of its SHA-256."""
+    return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
+
+
+def parsed_line(line: bytes) -> dict[str, object]:
+    """The JSON object on a line; else `LineError`. NaN and halves of characters are no JSON that can be written."""
+    try:
+        value = json.loads(line.decode(), parse_constant=_no_number)
+        if b"\\u" in line:
+            json.dumps(value, ensure_ascii=False).encode()
+    except (ValueError, RecursionError) as error:
+        raise LineError(f"not a JSON record ({_why_no_json(error)}); it was changed or damaged") from error
+    if not isinstance(value, dict):
+        raise LineError("not a JSON object; it was changed or damaged")
+    return value
+
+
+def _why_no_json(error: ValueError | RecursionError) -> str:
+    """Why a line is no record; advice on Python is nothing to whoever reads a journal."""
+    if isinstance(error, RecursionError):
+        return "it nests too deep"
+    if isinstance(error, UnicodeDecodeError):
+        return f"byte {error.start} is not UTF-8"
+    return "a number has thousands of digits" if "integer string conversion" in str(error) else str(error)
+
+
+def _no_number(name: str) -> object:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def check_chain(value: dict[str, object], number: int, before: str) -> None:
+    """`LineError` unless the record's number `n` and its `link` follow from the line before."""
+    if value.get("n") != number:
+        raise LineError(f"record number is {value.get('n')!r}, must be {number}; a line was lost or added")
+    if value.get("link") != before:
+        raise LineError(f"does not follow from line {number}, which was changed after it was written")
