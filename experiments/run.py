@@ -136,6 +136,22 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
 
 
+def _let_go(gun: Gun, why: KeyboardInterrupt | RunStopped) -> None:
+    """Close the gun of a run that was stopped. `RunStopped` says that it may be armed still."""
+    try:
+        gun.close()
+    except DeviceError as error:
+        if _POWER in str(why):
+            return
+        before = f"{why}; " if isinstance(why, RunStopped) else ""
+        stop = RunStopped(f"{before}the gun did not close ({error}): {_POWER}")
+        stop.saved = why.saved if isinstance(why, RunStopped) else None
+        raise stop from why
+
+
+_POWER = "switch off its power"
+
+
 def _refuse_excluded(place: Place, registered: Register) -> None:
     reason = registered.excluded().get(place.participant_id)
     if reason is not None:
@@ -154,6 +170,9 @@ def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Iterator[G
         raise PlaceError(f"--gun {request.gun}: {error}") from error
     try:
         yield gun
+    except (KeyboardInterrupt, RunStopped) as why:
+        _let_go(gun, why)
+        raise
     except BaseException:
         with suppress(DeviceError):
             gun.close()

@@ -11,7 +11,7 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import sha256
 from experiments.load import load_setup
 from experiments.rebuild import rebuild
-from experiments.record.lines import link_of, record_line
+from experiments.record.journal import link_of, record_line
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen

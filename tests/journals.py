@@ -10,8 +10,7 @@ from typing import Any
 
 from experiments.config.setup import canonical_json, sha256
 from experiments.design.plan import Plan
-from experiments.record.journal import Record
-from experiments.record.lines import link_of
+from experiments.record.journal import Record, link_of
 
 
 def raw(path: Path) -> list[dict[str, Any]]:

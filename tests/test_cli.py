@@ -12,7 +12,7 @@ import pytest
 
 from experiments.config.setup import canonical_json
 from experiments.load import shipped_folder
-from experiments.record.lines import link_of
+from experiments.record.journal import link_of
 from tests.conftest import Recoil, refused
 
 pytestmark = pytest.mark.slow

@@ -557,6 +557,25 @@ def test_a_plug_in_that_cannot_be_closed_leaves_a_finished_run_and_says_to_switc
     assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).finished
 
 
+def test_a_run_that_is_interrupted_says_that_its_gun_could_not_be_closed(
+    tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import sound_card_gun
+
+    def jammed(_: object) -> None:
+        raise OSError("the card is jammed")
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sound_card_gun.SoundCardGun, "close", jammed)
+    monkeypatch.setattr(SyntheticScreen, "act", interrupt)
+    request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
+    with pytest.raises(RunStopped, match=r"^the gun did not close \(.*card is jammed\): switch off its power$"):
+        runs.run(request, synthetic_screen, RealClock(50.0))
+    assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).records[-1].kind == "stopped"
+
+
 def test_a_plug_in_that_hangs_in_a_shot_stops_the_run_which_says_to_switch_off_its_power(
     tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,6 +12,7 @@ from device import open_gun
 from experiments import rebuild
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
+from experiments.record import storage
 from experiments.run import UnfinishedRun, run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
@@ -49,13 +50,18 @@ def asked(study: StudyFolder, code: str, **more: Any) -> RunRequest:
 def reads(study: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """How often each file is read from now on, by its name."""
     counted: Counter[str] = Counter()
-    read = Path.read_bytes
+    read, read_journal = Path.read_bytes, storage.read
 
     def counting(path: Path) -> bytes:
         counted[path.name] += 1
         return read(path)
 
+    def counting_journals(path: Path, most: int, start: int = 0) -> bytes:
+        counted[path.name] += 1
+        return read_journal(path, most, start)
+
     monkeypatch.setattr(Path, "read_bytes", counting)
+    monkeypatch.setattr(storage, "read", counting_journals)
     return counted
 
 

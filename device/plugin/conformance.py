@@ -18,7 +18,14 @@ from itertools import cycle, islice
 
 from device import open_gun
 from device.methods import Method, drive_of, paper_methods
-from device.plugin.guard import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S, PluginSilent, answer_within
+from device.plugin.guard import (
+    CLOCK_SLACK_S,
+    LENGTH_SLACK_PART,
+    LENGTH_SLACK_S,
+    PluginSilent,
+    answer_within,
+    start_aside,
+)
 from device.serial_gun.gun import speed_of
 from device.words import (
     DIRECTIONS,
@@ -128,6 +135,8 @@ class OpenedGuns:
         self._lock = threading.Lock()
         self._guns: list[Gun] = []
         self._over = False
+        self.problem = ""
+        """Why the last gun may be armed still."""
 
     def open(self) -> Gun:
         """The next gun. `LinkError`: it is over."""
@@ -144,8 +153,10 @@ class OpenedGuns:
         with self._lock:
             self._over = True
         for gun in self._guns:
-            with suppress(DeviceError):
+            try:
                 gun.close()
+            except DeviceError as error:
+                self.problem = f"{error}: switch off its power"
 
 
 def _untold(_: ConformanceFinding) -> None:
@@ -334,7 +345,7 @@ def _called_off(rig: ConformanceRig, gun: Gun, shot: Shot) -> bool:
         finally:
             ended.set()
 
-    threading.Thread(target=fire, daemon=True, name="waiting shot").start()
+    start_aside(fire, "waiting shot")
     over = ended.wait(AHEAD_S / 3 / rig.speed)
     disarmed_s = rig.clock()
     gun.disarm()

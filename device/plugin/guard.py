@@ -7,6 +7,7 @@ is believed only if it fits the command and the clock, and each of its calls has
 from __future__ import annotations
 
 import math
+import signal
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -62,6 +63,15 @@ class PluginSilent(PluginError):  # noqa: N818 - what is so
 
 def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
     """What an act gives back, or raises. `TimeoutError`: it takes longer; it is then left to itself."""
+    done = begun_aside(act, "plug-in")
+    wait_awake(done, seconds)
+    if not done.done():
+        raise TimeoutError(f"no answer within {seconds:g} s")
+    return done.result()
+
+
+def begun_aside(act: Callable[[], _Answer], name: str) -> Future[_Answer]:
+    """What an act gives back or raises, once it does: it has begun in a thread of its own."""
     done: Future[_Answer] = Future()
 
     def carry_out() -> None:
@@ -72,11 +82,27 @@ def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
         except BaseException as error:  # noqa: BLE001 - SystemExit and the like end no program of ours
             done.set_exception(RuntimeError(f"it tried to end the program ({said_by(error)})"))
 
-    threading.Thread(target=carry_out, daemon=True, name="plug-in").start()
-    wait_awake(done, seconds)
-    if not done.done():
-        raise TimeoutError(f"no answer within {seconds:g} s")
-    return done.result()
+    start_aside(carry_out, name)
+    return done
+
+
+_SIGNALS = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
+
+
+def start_aside(act: Callable[[], None], name: str) -> None:
+    """A thread that ends with the program, and takes no signal that is meant for the main thread (see `AWAKE_S`).
+
+    Threads that it starts take none either.
+    """
+    thread = threading.Thread(target=act, daemon=True, name=name)
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        thread.start()
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        thread.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def wait_awake(done: Future[_Answer], seconds: float) -> None:

@@ -81,7 +81,7 @@ def _become_ready(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) 
     while buffer.length_s < SAMPLES_S:
         _read(sensor, buffer, silence)
         if time.monotonic() > end_s:
-            heard = buffer.length_s > 0
+            heard = bool(np.isfinite(buffer.last_s))
             raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s: {_WHY[heard]}")
         time.sleep(_RANDOM.uniform(*READ_EVERY_S))
     if buffer.rate_Hz < LEAST_RATE_HZ:

@@ -13,10 +13,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -31,7 +29,7 @@ from device import DeviceError, open_gun
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
-from device.plugin.guard import PluginError, wait_awake
+from device.plugin.guard import PluginError, begun_aside, wait_awake
 from device.serial_gun.gun import SCHEME, speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
@@ -282,13 +280,20 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
     """What every gun keeps, tried on this one."""
     try:
         rig = rig_at(address, trials=trials)
-        guns, found = OpenedGuns(rig.open_gun), list[ConformanceFinding]()
-        rig = replace(rig, open_gun=guns.open)
+    except ValueError as error:
+        raise PlaceError(f"--gun {address}: {error}") from error
+    guns, found = OpenedGuns(rig.open_gun), list[ConformanceFinding]()
+    rig = replace(rig, open_gun=guns.open)
+    try:
         within_seconds((trials + 20) * SHOT_S + DEADLINE_S, lambda: conformance(rig, found.append), guns.let_go)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
+    except KeyboardInterrupt:
+        if guns.problem:
+            raise PlaceError(f"--gun {address}: interrupted; {guns.problem}") from None
+        raise
     except TimeoutError as error:
-        late = ConformanceFinding(check="time", kept=False, said=f"{error}; switch off the gun's power")
+        late = ConformanceFinding(check="time", kept=False, said=f"{error}; {guns.problem or 'it was let go of'}")
         return (verdicts.of_conformance((*found, late)),)
     return (verdicts.of_conformance(found),)
 
@@ -365,16 +370,8 @@ def within_seconds(seconds: float, work: Callable[[], _Result], stop: Callable[[
 
     `stop` is called first where it is given up, also by an interrupt.
     """
-    done: Future[_Result] = Future()
-
-    def carry_out() -> None:
-        try:
-            done.set_result(work())
-        except Exception as error:  # noqa: BLE001 - raised again where it is waited for
-            done.set_exception(error)
-
+    done = begun_aside(work, "check")
     try:
-        threading.Thread(target=carry_out, daemon=True, name="check").start()
         wait_awake(done, seconds)
     except KeyboardInterrupt:
         stop()

@@ -8,7 +8,9 @@ hash of that record's line (`link_of`): a record changed by hand breaks the chai
 from __future__ import annotations
 
 import hashlib
+import json
 import os
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -23,7 +25,7 @@ from experiments.clock import Clock
 from experiments.config.setup import sha256
 from experiments.design.plan import Plan
 from experiments.record import storage
-from experiments.record.lines import LineError, check_chain, link_of, parsed_line, record_line
+from experiments.record.lines import LineError, check_chain, parsed_line
 
 ParticipantKind = Literal["person", "synthetic"]
 """Who does a run."""
@@ -293,6 +295,16 @@ def _held(path: Path, descriptor: int) -> int:
         os.close(descriptor)
         raise JournalError(f"{path}: another run holds this journal; close that one first")
     return descriptor
+
+
+def record_line(record: Mapping[str, object]) -> bytes:
+    """A record as JSON with its keys as they stand, so that the order of a design's factors is kept; no NaN."""
+    return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def link_of(line: bytes) -> str:
+    """What the next record says of a line: the first 16 digits of its SHA-256."""
+    return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
 
 
 def read_journal(path: Path) -> Contents:

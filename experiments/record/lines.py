@@ -1,26 +1,14 @@
-"""A line of a journal or register: a JSON object with its number and the hash of the line before. Pure."""
+"""A line of a journal or register as it is read: a JSON object that follows from the line before. Pure."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Mapping
 
 from device.words import RecoilError
 
 
 class LineError(RecoilError):
     """A line that is no record, or does not follow from the one before; the message has no place."""
-
-
-def record_line(record: Mapping[str, object]) -> bytes:
-    """A record as JSON with its keys as they stand, so that the order of a design's factors is kept; no NaN."""
-    return json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode() + b"\n"
-
-
-def link_of(line: bytes) -> str:
-    """What the next record says of a line: the first 16 digits of its SHA-256."""
-    return hashlib.sha256(line.rstrip(b"\r\n")).hexdigest()[:16]
 
 
 def parsed_line(line: bytes) -> dict[str, object]:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.record import journal, storage
-from experiments.record.journal import JournalError, Record, head_of, record_of
-from experiments.record.lines import link_of
+from experiments.record.journal import JournalError, Record, head_of, link_of, record_of
 
 LOOK_BYTES = journal.MOST_LINE
 """So much of a journal is read in one look."""

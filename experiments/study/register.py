@@ -22,8 +22,8 @@ from experiments.config.door import Model, Text
 from experiments.config.findings import CODE
 from experiments.config.setup import canonical_json
 from experiments.record import storage
-from experiments.record.journal import JournalError
-from experiments.record.lines import LineError, check_chain, link_of, parsed_line
+from experiments.record.journal import JournalError, link_of
+from experiments.record.lines import LineError, check_chain, parsed_line
 from experiments.study.study import Facts, Member
 
 REGISTER_FILE = "participants.jsonl"

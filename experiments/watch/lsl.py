@@ -32,6 +32,7 @@ _READINGS = 20
 """Readings of which the quickest counts."""
 FOUND_S = 2.0
 """How long it is looked for our own streams; on a network that works they are there within a few milliseconds."""
+_LATE_S = 10.0
 LINGER_S = 0.5
 """So long the streams stay for those who still read."""
 _INSTALL = (
@@ -158,7 +159,11 @@ def send_markers(
     if hasattr(os, "nice"):
         os.nice(NICE)
     with quiet_library():
+        late = threading.Timer(_LATE_S, say, ("pylsl is still being imported; if it hangs, install it anew",))
+        late.daemon = True
+        late.start()
         streams = MarkerOutlets(source_of(folder))
+        late.cancel()
         try:
             feed = MarkerFeed(folder, say)
             problem = "" if streams.found() else _NOT_FOUND
