@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from contextlib import suppress
@@ -27,7 +26,10 @@ class Clock(Protocol):
         """Wait; not at all if the time is over."""
 
     def wait(self, news: threading.Condition, seconds: float | None) -> None:
-        """Wait for news, at most for so long; the condition's lock is held before and after."""
+        """Wait for news, at most for so long; the condition's lock is held before and after.
+
+        It may end without any news, so whoever waits looks again.
+        """
 
     def go_on_after(self, utc: str) -> None:
         """A run that stopped at this date and time goes on."""
@@ -54,10 +56,8 @@ class RealClock:
             time.sleep(seconds / self._speed)
 
     def wait(self, news: threading.Condition, seconds: float | None) -> None:
-        """Wait for news for real; interrupts come through."""
-        end_s = math.inf if seconds is None else time.monotonic() + seconds / self._speed
-        while not news.wait(min(AWAKE_S, max(0.0, end_s - time.monotonic()))) and time.monotonic() < end_s:
-            pass
+        """Wait for news for real, but no longer than `AWAKE_S`, so that interrupts come through."""
+        news.wait(AWAKE_S if seconds is None else min(AWAKE_S, max(0.0, seconds / self._speed)))
 
     def go_on_after(self, utc: str) -> None:
         """The machine's date and time are what they are, earlier ones too."""

@@ -226,10 +226,10 @@ class LiveRun:
 
     def stay_halted(self) -> str:
         """Wait until a halted run is closed; why."""
-        while self._position.base is State.HALTED:
-            self._screen.act(self._position, None)
+        while (halted := self._position).base is State.HALTED:
+            self._screen.act(halted, None)
             with self.news:
-                if self._position.base is State.HALTED:
+                while self._position is halted:
                     self.clock.wait(self.news, None)
         return self._position.why
 
