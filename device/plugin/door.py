@@ -166,7 +166,7 @@ def entry_of(name: str, kind: PluginKind = GUN_PLUGINS) -> EntryPoint:
     if len({point.value for point in found}) > 1:
         packages = ", ".join(sorted(_package(point) for point in found))
         raise PluginError(f"{kind.name} {name}: several packages bring it: {packages}; uninstall all but one")
-    (point,) = found[:1]
+    point = found[0]
     if not point.pattern.match(point.value):
         raise PluginError(
             f"{kind.name} {name}: the package {_package(point)} gives it as `{name} = {point.value}` in its entry "
