@@ -127,8 +127,7 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:
     """Import a plug-in in a process of its own, which may hang or crash. `PluginError` says what it did."""
-    command = [sys.executable, "-P", "-m", "device.plugin", name]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
+    command, environment = own_program("device.plugin", name)
     with tempfile.TemporaryFile() as errors:
         try:
             done = subprocess.run(
@@ -151,6 +150,12 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
         ended = f"was killed by signal {-done.returncode}" if done.returncode < 0 else "failed"
         ended = ended if done.returncode else "ended the process"
         raise PluginError(f"gun plug-in {name}: its import {ended}: {said.rpartition(chr(10))[2] or 'it said nothing'}")
+
+
+def own_program(module: str, word: str) -> tuple[list[str], dict[str, str]]:
+    """The command and the environment of `python -m MODULE WORD`, which finds the packages that this process finds."""
+    paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
+    return [sys.executable, "-P", "-m", module, word], os.environ | {"PYTHONPATH": paths}
 
 
 def entry_of(name: str, kind: PluginKind = GUN_PLUGINS) -> EntryPoint:

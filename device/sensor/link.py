@@ -6,20 +6,18 @@ A line of JSON each way: shots go out; back comes that it is ready, what was mea
 from __future__ import annotations
 
 import json
-import os
 import queue
 import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Protocol
 
 from pydantic import TypeAdapter, ValidationError
 
 from device.methods import Method
+from device.plugin.door import own_program
 from device.sensor.process import UNHEARD_S, SensorReady, ShotAsked, ShotReply
 from device.sensor.streams import SensorError
 
@@ -83,9 +81,9 @@ class SensorLink:
 
     def __init__(self, address: str, start_s: float = START_S) -> None:
         self.address, self.silent, self.dropped, self.ended = address, False, 0, ""
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
+        command, environment = own_program("device.sensor", address)
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "device.sensor", address],
+            command,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
