@@ -6,11 +6,12 @@ import hashlib
 import os
 import shlex
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from device import DeviceError, Gun, open_gun
+from device.plugin.guard import interrupts_held
 from experiments.catalogues.catalogue import ENGLISH, Language, language
 from experiments.clock import Clock, date_text
 from experiments.config.door import ConfigError
@@ -136,14 +137,15 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
 
 
-def _let_go(gun: Gun, why: KeyboardInterrupt | RunStopped) -> None:
-    """Close the gun of a run that was stopped. `RunStopped` says that it may be armed still."""
+def _let_go(gun: Gun, why: BaseException) -> None:
+    """Close the gun of a run that was broken off. `RunStopped` says that it may be armed still."""
     try:
-        gun.close()
+        with interrupts_held():
+            gun.close()
     except DeviceError as error:
         if _POWER in str(why):
             return
-        before = f"{why}; " if isinstance(why, RunStopped) else ""
+        before = "" if isinstance(why, KeyboardInterrupt) else f"{why}; "
         stop = RunStopped(f"{before}the gun did not close ({error}): {_POWER}")
         stop.saved = why.saved if isinstance(why, RunStopped) else None
         raise stop from why
@@ -170,15 +172,12 @@ def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Iterator[G
         raise PlaceError(f"--gun {request.gun}: {error}") from error
     try:
         yield gun
-    except (KeyboardInterrupt, RunStopped) as why:
+    except BaseException as why:
         _let_go(gun, why)
         raise
-    except BaseException:
-        with suppress(DeviceError):
-            gun.close()
-        raise
     try:
-        gun.close()
+        with interrupts_held():
+            gun.close()
     except DeviceError as error:
         raise GunNotClosed(error) from error
 

@@ -342,6 +342,42 @@ def test_an_interrupted_doctor_fires_no_more_and_leaves_no_gun_armed(
     assert "arm" not in told[len(told) - 1 - told[::-1].index("disarm") :]
 
 
+DEAF = """
+import time
+from device.simulated import SimulatedGun
+class Deaf(SimulatedGun):
+    fired = False
+    def fire(self, shot, at_s=None):
+        self.fired = True
+        return super().fire(shot, at_s)
+    def disarm(self):
+        if self.fired:
+            with open("heard.txt", "a") as file: file.write("disarm\\n")
+            time.sleep(60)
+        super().disarm()
+def open_gun(address, methods, clock):
+    return Deaf(methods, clock)
+"""
+
+
+@pytest.mark.slow
+def test_a_doctor_that_is_interrupted_again_and_again_says_that_its_gun_may_be_armed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(monkeypatch, tmp_path, DEAF, name="deaf", module="deaf_gun")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    heard = tmp_path / "heard.txt"
+    words = [RECOIL, "doctor", "--gun", "deaf:", "--fire", "1000"]
+    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as doctor:
+        wait_for(lambda: heard.exists() and "disarm" in heard.read_text())
+        for _ in range(3):
+            doctor.send_signal(signal.SIGINT)
+            time.sleep(0.1)
+        _, said = doctor.communicate(timeout=PATIENCE_S)
+    assert "switch off its power" in said
+    assert "Traceback" not in said
+
+
 # what the guard believes, and what it lets through
 
 
@@ -356,7 +392,11 @@ class Liar(SimulatedGun):
         self.is_armed = True
 
     def disarm(self) -> None:
+        self.lie.get("disarms", lambda: None)()
         self.is_armed = self.lie.get("stays_armed", False)
+
+    def close(self) -> None:
+        self.lie.get("closes", lambda: None)()
 
     def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
         self.heard.append(shot)
@@ -488,6 +528,80 @@ def test_a_plug_in_that_stays_armed_is_told_of(clock):
 def test_a_plug_in_that_is_born_armed_is_refused(clock):
     with pytest.raises(PluginError, match="is armed when it is opened; a gun is born disarmed"):
         GuardedGun("eager", Liar(clock, status={"state": "armed"}), paper_methods(), clock)
+
+
+def test_a_plug_in_that_is_born_armed_is_disarmed_and_one_that_cannot_be_let_go_of_is_told_of(clock):
+    calls = list[str]()
+    eager = Liar(clock, disarms=lambda: calls.append("disarm"), closes=lambda: calls.append("close"))
+    eager.is_armed = True
+    with pytest.raises(PluginError, match=r"is armed when it is opened; a gun is born disarmed$"):
+        GuardedGun("eager", eager, paper_methods(), clock)
+    assert (calls, eager.is_armed) == (["disarm", "close"], False)
+    stuck = Liar(clock, closes=lambda: 1 / 0)
+    stuck.is_armed = True
+    with pytest.raises(PluginError, match=r"when it is opened; .*not let go of \(.*broke off in close.*switch off"):
+        GuardedGun("stuck", stuck, paper_methods(), clock)
+
+
+class Hangups:
+    """Interrupts again and again, from the thread of the plug-in, which then goes on for a while."""
+
+    def __init__(self) -> None:
+        self.pressing = threading.Lock()
+
+    def press(self, *_: object) -> None:
+        with self.pressing:
+            for _ in range(3):
+                os.kill(os.getpid(), signal.SIGHUP)
+                time.sleep(0.1)
+
+
+@pytest.fixture
+def hangups() -> Iterator[Hangups]:
+    def tell(*_: object) -> None:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    pressed, before = Hangups(), signal.signal(signal.SIGHUP, tell)
+    yield pressed
+    with pressed.pressing:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_no_interrupt_keeps_a_gun_from_being_disarmed_and_closed(clock, hangups):
+    closed = threading.Event()
+    gun, liar = guarded(clock, disarms=hangups.press, closes=closed.set)
+    with pytest.raises(KeyboardInterrupt):
+        gun.close()
+    assert closed.is_set()
+    assert not liar.is_armed
+
+
+def test_a_gun_that_is_not_disarmed_is_told_of_whatever_interrupts(clock, hangups):
+    gun, _ = guarded(clock, disarms=hangups.press, stays_armed=True)
+    with pytest.raises(PluginError, match="is armed after it was disarmed; switch off its power"):
+        gun.close()
+
+
+def test_who_closes_a_gun_that_another_is_closing_learns_what_became_of_it(clock, monkeypatch):
+    monkeypatch.setattr(guard, "DISARM_S", 0.3)
+    begun, on = threading.Event(), threading.Event()
+    gun, _ = guarded(clock, disarms=lambda: (begun.set(), on.wait(PATIENCE_S)))
+    closing = guard.begun_aside(gun.close, "closing")
+    begun.wait(PATIENCE_S)
+    with pytest.raises(PluginError, match="gun plug-in liar was not disarmed and closed"):
+        gun.close()
+    assert isinstance(closing.exception(PATIENCE_S), PluginError)
+    on.set()
+
+
+def test_an_interrupt_while_a_plug_in_is_first_asked_leaves_it_disarmed(clock, hangups):
+    liar, first = Liar(clock), iter([hangups.press])
+    liar.is_armed = True
+    liar.status = lambda: (next(first, time.monotonic)(), Liar.status(liar))[1]  # type: ignore[assignment, method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        GuardedGun("liar", liar, paper_methods(), clock)
+    assert not liar.is_armed
 
 
 @pytest.mark.parametrize(

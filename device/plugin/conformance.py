@@ -24,6 +24,7 @@ from device.plugin.guard import (
     LENGTH_SLACK_S,
     PluginSilent,
     answer_within,
+    interrupts_held,
     start_aside,
 )
 from device.serial_gun.gun import speed_of
@@ -150,13 +151,14 @@ class OpenedGuns:
 
     def let_go(self) -> None:
         """Disarm and close what is open; none is opened any more."""
-        with self._lock:
-            self._over = True
-        for gun in self._guns:
-            try:
-                gun.close()
-            except DeviceError as error:
-                self.problem = f"{error}: switch off its power"
+        with interrupts_held():
+            with self._lock:
+                self._over = True
+            for gun in self._guns:
+                try:
+                    gun.close()
+                except DeviceError as error:
+                    self.problem = f"{error}: switch off its power"
 
 
 def _untold(_: ConformanceFinding) -> None:

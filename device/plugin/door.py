@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import cast
 
 from device.methods import Method
-from device.plugin.guard import GuardedGun, PluginError, answer_within
+from device.plugin.guard import DISARM_S, GuardedGun, PluginError, answer_within, interrupts_held
 from device.words import Gun, LinkError, error_line, said_by
 
 
@@ -121,8 +121,22 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
         raise PluginError(f"{address}: {error_line(error)}") from error
     except Exception as error:
         raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}") from error
-    check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")
+    try:
+        check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")
+    except PluginError as error:
+        raise PluginError(f"{error}{_put_away(gun)}") from error
     return GuardedGun(name, cast("Gun", gun), methods, clock)
+
+
+def _put_away(gun: object) -> str:
+    """Disarm and close what lacks something; what is to be said where that cannot be done."""
+    try:
+        with interrupts_held():
+            for command in ("disarm", "close"):
+                answer_within(DISARM_S, getattr(gun, command))
+    except Exception:  # noqa: BLE001 - a plug-in may do anything
+        return "; it could not be disarmed and closed: switch off its power"
+    return ""
 
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:

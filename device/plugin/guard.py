@@ -10,10 +10,11 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from types import MappingProxyType
+from types import FrameType, MappingProxyType
 from typing import TypeVar
 
 from device.limits import DriveHistory, planned_start_s
@@ -86,7 +87,7 @@ def begun_aside(act: Callable[[], _Answer], name: str) -> Future[_Answer]:
     return done
 
 
-_SIGNALS = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 def start_aside(act: Callable[[], None], name: str) -> None:
@@ -103,6 +104,27 @@ def start_aside(act: Callable[[], None], name: str) -> None:
         thread.start()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Let a gun be let go of, however often Ctrl+C is pressed: what comes meanwhile acts at the end.
+
+    It does not where the end is an error, which has more to say. Threads other than the main one are never interrupted.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came, before = list[int](), dict[int, Callable[[int, FrameType | None], object] | int | None]()
+    try:
+        for number in _SIGNALS:
+            before[number] = signal.signal(number, lambda it, _: came.append(it))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+    if came:
+        signal.raise_signal(came[0])
 
 
 def wait_awake(done: Future[_Answer], seconds: float) -> None:
@@ -138,16 +160,17 @@ class GuardedGun:
         self.name = name
         self._gun, self._methods, self._clock = gun, MappingProxyType(dict(methods)), clock
         self._turn = threading.Lock()  # of arm and fire
-        self._told = threading.Condition()  # guards the four below
+        self._told = threading.Condition()  # guards the five below
         self._armed = self._closed = False
+        self._gone: bool | None = None  # once closed: whether it was let go of
         self._disarms = 0
         self._silent = ""  # the call that it never answered
+        self._disarm_s = DISARM_S
         self._history = DriveHistory()
         try:
             self._check_disarmed("when it is opened; a gun is born disarmed")
-        except LinkError:
-            self._closed = True
-            self._ask("close", self._gun.close)
+        except BaseException as why:  # an interrupt too
+            self._refuse(why)
             raise
 
     def identify(self) -> Identity:
@@ -204,14 +227,36 @@ class GuardedGun:
 
     def close(self) -> None:
         """Disarm, and let go of the gun: at once, whatever another thread asks of it."""
-        with self._told:
-            if self._closed:
+        with interrupts_held():
+            with self._told:
+                again, self._closed = self._closed, True
+            if again:
+                self._check_gone()
                 return
-            self._closed = True
+            try:
+                self._let_go()
+                self._tell_gone(True)
+            except BaseException:
+                self._tell_gone(False)
+                raise
+
+    def _let_go(self) -> None:
         try:
             self.disarm()
         finally:
             self._ask("close", self._gun.close)
+
+    def _tell_gone(self, gone: bool) -> None:
+        with self._told:
+            self._gone = gone
+            self._told.notify_all()
+
+    def _check_gone(self) -> None:
+        """What became of a closing, which may be under way."""
+        with self._told:
+            self._told.wait_for(lambda: self._gone is not None, DISARM_S)
+            if not self._gone:
+                raise PluginError(f"gun plug-in {self.name} was not disarmed and closed")
 
     # what is asked of the plug-in
 
@@ -232,7 +277,20 @@ class GuardedGun:
             raise PluginError(f"gun plug-in {self.name} broke off in {what}: {said_by(error)}") from error
 
     def _disarm_it(self) -> None:
-        self._ask("disarm", self._gun.disarm, DISARM_S)
+        """Have it disarm; one that did not answer is told again, and not waited for so long again."""
+        try:
+            self._ask("disarm", self._gun.disarm, self._disarm_s)
+        except PluginSilent:
+            self._disarm_s = AWAKE_S
+            raise
+
+    def _refuse(self, why: BaseException) -> None:
+        """Let go of a gun that is not taken. `PluginError`: it may be armed still."""
+        try:
+            self.close()
+        except LinkError as error:
+            said = error_line(why) if isinstance(why, LinkError) else f"gun plug-in {self.name}: interrupted"
+            raise PluginError(f"{said}; it was not let go of ({error_line(error)}): switch off its power") from why
 
     def _check_disarmed(self, when: str) -> None:
         state = _checked_status(self.name, self._ask("status", self._gun.status), self._clock()).state
