@@ -20,6 +20,7 @@ from experiments.record.journal import Contents, read_journal
 from experiments.watch.feed import MarkerFeed
 from experiments.watch.lsl import source_of
 from experiments.watch.markers import KEY_S, RECORD_S, Marker, RunMarkers
+from experiments.watch.markers_process import markers_beside
 from tests.at_runs import shorten
 from tests.at_terminal import DAMPER, ENDS, FIRES, AtTerminal
 from tests.conftest import RECOIL, Recoil
@@ -27,7 +28,7 @@ from tests.gun_plugins import ROOT
 from tests.journals import forged, raw
 from tests.kills import words
 from tests.recorder import markers_process, recorded, recording
-from tests.waiting import PATIENCE_S
+from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
 NAME = "sub-P01_task-direction_journal.jsonl"
@@ -164,6 +165,56 @@ def test_what_is_in_the_way_is_said_once_and_the_run_goes_on(  # noqa: PLR0917
     (line,) = [line for line in done.stderr.splitlines() if "clock of its own" not in line]
     assert said in line
     assert read_journal(tmp_path / "results" / "sub-P01" / NAME).finished
+
+
+LIBRARY = """
+import time
+IRREGULAR_RATE = 0.0
+class Any:
+    def __getattr__(self, name): return lambda *_: self
+StreamInfo = lambda *_: Any()
+class StreamOutlet:
+    def __init__(self, info): pass
+    def push_sample(self, sample, at_s): {push}
+    def have_consumers(self): return False
+def local_clock(): return {clock}
+def resolve_bypred(*_): return {found}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("odd", "said"),
+    [
+        ({}, ""),
+        ({"push": "1 / 0"}, "no markers: Lab Streaming Layer broke off (ZeroDivisionError: division by zero)"),
+        ({"push": "time.sleep(3600)"}, "markers: their process hung and was ended; some may not have been sent"),
+        ({"push": "__import__('os')._exit(7)"}, "markers: their process broke off (exit code 7)"),
+        ({"found": "None"}, "no markers: Lab Streaming Layer broke off (TypeError: object of type 'NoneType'"),
+        ({"clock": "float('nan')"}, "is not what it should be (ValueError: its clock gives nan)"),
+    ],
+)
+def test_what_an_odd_library_does_in_a_run_is_said_once(  # noqa: PLR0917
+    odd: dict[str, str],
+    said: str,
+    journal: Path,
+    whole: bytes,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    pushed = tmp_path / "pushed"
+    parts = {"push": "None", "found": "[1, 2]", "clock": "time.monotonic()"} | odd
+    parts["push"] = f"open({str(pushed)!r}, 'w').close(); {parts['push']}"
+    (tmp_path / "fake").mkdir()
+    (tmp_path / "fake" / "pylsl.py").write_text(LIBRARY.format(**parts))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
+    told = list[str]()
+    with markers_beside(journal.parents[1], told.append):
+        journal.write_bytes(forged(now(entries_of(whole))[:3]))
+        wait_for(lambda: told or pushed.exists())
+    assert [said in line for line in told] == [True] * bool(said)
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_markers_need_a_folder_that_is_there_and_a_library(recoil: Recoil, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import platform
 import sys
@@ -74,7 +75,9 @@ class MarkerOutlets:
             import pylsl  # noqa: PLC0415 - an extra, used here alone
         except (ImportError, OSError, RuntimeError) as error:  # no package, or a package without its library
             raise NoStreams(f"no Lab Streaming Layer here ({error_line(error)}): {_INSTALL}") from error
-        except (Exception, SystemExit) as error:  # something else by its name
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # something else by its name
             raise NoStreams(f"the package pylsl is broken ({said_by(error)}): {_INSTALL}") from error
         self._lsl, self._source = pylsl, source
         try:
@@ -101,21 +104,24 @@ class MarkerOutlets:
     def found(self) -> bool:
         """Whether the streams are found by who looks for them on the network."""
         predicate = f"starts-with(source_id,'{self._source}')"
-        return len(self._lsl.resolve_bypred(predicate, len(self._outlets), FOUND_S)) == len(self._outlets)
+        with _of_library():
+            return len(self._lsl.resolve_bypred(predicate, len(self._outlets), FOUND_S)) == len(self._outlets)
 
     def send(self, marker: Marker) -> None:
         """Send a marker with its time on the clock of the streams, whose own uncertainty is added. Never waits."""
-        there = self._clock_now()
-        told = replace(marker, uncertainty_s=marker.uncertainty_s + there.uncertainty_s)
-        at_s = there.there(marker.at_s)
-        for outlet, sample in zip(self._outlets, ((told.name,), told.details), strict=True):
-            outlet.push_sample(sample, at_s)
+        with _of_library():
+            there = self._clock_now()
+            told = replace(marker, uncertainty_s=marker.uncertainty_s + there.uncertainty_s)
+            at_s = there.there(marker.at_s)
+            for outlet, sample in zip(self._outlets, ((told.name,), told.details), strict=True):
+                outlet.push_sample(sample, at_s)
 
     def close(self) -> None:
         """Let go of the streams, when those who read had their time."""
-        if any(outlet.have_consumers() for outlet in self._outlets):
-            time.sleep(LINGER_S)
-        self._outlets.clear()
+        with _of_library():
+            if any(outlet.have_consumers() for outlet in self._outlets):
+                time.sleep(LINGER_S)
+            self._outlets.clear()
 
     def _clock_now(self) -> ClockMap:
         now_s = time.monotonic()
@@ -128,7 +134,21 @@ class MarkerOutlets:
     def _mapped(self) -> ClockMap:
         """The clock of the streams beside that of the journals, which are the same on some systems."""
         read, there = time.monotonic, self._lsl.local_clock
-        return clock_map(RoundTrip(sent_s=read(), there_s=there(), back_s=read()) for _ in range(_READINGS))
+        found = clock_map(RoundTrip(sent_s=read(), there_s=there(), back_s=read()) for _ in range(_READINGS))
+        if not math.isfinite(found.offset_s):
+            raise ValueError(f"its clock gives {there()!r}")
+        return found
+
+
+@contextmanager
+def _of_library() -> Iterator[None]:
+    """`NoStreams` for whatever the library raises."""
+    try:
+        yield
+    except Exception as error:
+        raise NoStreams(
+            f"Lab Streaming Layer broke off ({said_by(error)}): what follows is not sent; the journals are whole"
+        ) from error
 
 
 @contextmanager
@@ -159,7 +179,7 @@ def send_markers(
     if hasattr(os, "nice"):
         os.nice(NICE)
     with quiet_library():
-        late = threading.Timer(_LATE_S, say, ("pylsl is still being imported; if it hangs, install it anew",))
+        late = threading.Timer(_LATE_S, say, ("pylsl does not answer yet; if it hangs, install it anew",))
         late.daemon = True
         late.start()
         streams = MarkerOutlets(source_of(folder))

@@ -19,14 +19,16 @@ from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
 
 READY_S, _SOON_S = 20.0, 5.0
 """How long a run waits for the streams before it begins, and after how long it says that it waits."""
-_END_S = 5.0
-"""How long the streams have for what is still to be sent, and again to end when they are told to."""
+_END_S, _STOPPED_S = 5.0, 1.0
+"""How long the streams have for what is still to be sent, and again to end when they are told to; and where the run was
+broken off."""
 _ROOT = Path(__file__).parents[2]
-_READY = "ready"
+_Tell = Callable[[str], None]
+_READY, _PROBLEM = "ready", "markers: "
 
 
 @contextmanager
-def markers_beside(results: Path, say: Callable[[str], None]) -> Iterator[None]:
+def markers_beside(results: Path, say: _Tell) -> Iterator[None]:
     """Have the runs of a results folder sent meanwhile. Whatever is in the way is said once, and nothing else."""
     command = [sys.executable, "-m", __name__, str(results.absolute())]
     try:
@@ -43,11 +45,17 @@ def markers_beside(results: Path, say: Callable[[str], None]) -> Iterator[None]:
         say(f"no markers: {error}")
         yield
         return
+    lines, left_s, there = _lines(child), _STOPPED_S, True
     try:
-        _wait_ready(_lines(child), say)
+        there = _wait_ready(lines, say)
         yield
+        left_s = _END_S
     finally:
-        _end(child, say)
+        _end(child, lines, say if there else _nothing, left_s)
+
+
+def _nothing(_: str) -> None:
+    """It was said that there are no markers."""
 
 
 def _lines(child: subprocess.Popen[str]) -> queue.SimpleQueue[str]:
@@ -64,34 +72,48 @@ def _lines(child: subprocess.Popen[str]) -> queue.SimpleQueue[str]:
     return lines
 
 
-def _wait_ready(lines: queue.SimpleQueue[str], say: Callable[[str], None]) -> None:
+def _wait_ready(lines: queue.SimpleQueue[str], say: _Tell) -> bool:
+    """Wait until a child is ready, or it is late; whether there may be markers."""
     try:
         with suppress(queue.Empty):
-            return _say_if_not(lines.get(timeout=_SOON_S), say)
+            return _is_ready(lines.get(timeout=_SOON_S), say)
         say(f"the run waits for the streams of its markers, at most {READY_S:g} s")
-        _say_if_not(lines.get(timeout=READY_S - _SOON_S), say)
+        return _is_ready(lines.get(timeout=READY_S - _SOON_S), say)
     except queue.Empty:
         say(f"no markers yet: their streams are not there after {READY_S:g} s; the run begins without them")
+        return True
 
 
-def _say_if_not(said: str, say: Callable[[str], None]) -> None:
-    """What a child says that is not ready."""
+def _is_ready(said: str, say: _Tell) -> bool:
+    """Whether a child that said something first may send; what else it says is told."""
     if said != _READY:
         say(said or "no markers: their process ended at once")
+    return said.startswith((_READY, _PROBLEM))
 
 
-def _end(child: subprocess.Popen[str], say: Callable[[str], None]) -> None:
-    """Let the child send the rest and end. One that ended before the run did says why; its exit code is 0 or 2."""
-    if child.poll() not in (None, 0, 2):
-        say(f"markers: their process ended before the run (exit code {child.returncode}); its journal is whole")
+def _end(child: subprocess.Popen[str], lines: queue.SimpleQueue[str], tell: _Tell, left_s: float) -> None:
+    """Let the child send the rest and end, and say what it said since, or that it hung or died."""
     with suppress(OSError):
         assert child.stdin is not None  # noqa: S101 - a pipe
         child.stdin.close()
+    hung = not _ended(child, left_s)
+    with suppress(queue.Empty):
+        while said := lines.get(timeout=left_s):
+            _is_ready(said, tell)
+    if hung:
+        tell("markers: their process hung and was ended; some may not have been sent, and the journal is whole")
+    elif child.returncode not in (0, 2):
+        tell(f"markers: their process broke off (exit code {child.returncode}); its journal is whole")
+
+
+def _ended(child: subprocess.Popen[str], left_s: float) -> bool:
+    """Whether a child ends by itself; one that does not is ended."""
     for insist in (child.poll, child.terminate, child.kill):
         insist()
         with suppress(subprocess.TimeoutExpired):
-            child.wait(_END_S)
-            break
+            child.wait(left_s)
+            return insist == child.poll
+    return False
 
 
 def _until_left(over: threading.Event) -> None:
@@ -111,7 +133,7 @@ def send_beside() -> int:
     threading.Thread(target=_until_left, args=(over,), daemon=True).start()
 
     def tell(made: MarkerStreams) -> None:
-        print(f"markers: {made.problem}" if made.problem else _READY, flush=True)  # noqa: T201 - to the run
+        print(f"{_PROBLEM}{made.problem}" if made.problem else _READY, flush=True)  # noqa: T201 - to the run
 
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
