@@ -13,6 +13,7 @@ from device.serial_gun.gun import speed_of
 from device.words import few_of_each
 from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
 from experiments.clock import Clock, RealClock, VirtualClock
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
@@ -46,9 +47,14 @@ class LanguageOptions:
         check_allowed(found, unchecked=self.unchecked)
         return found
 
-    def usable(self) -> tuple[Language, ...]:
-        """Every language that may be used."""
-        found = (language(code, self.folder) for code in languages(self.folder))
+    def usable(self, say: Callable[[str], None]) -> tuple[Language, ...]:
+        """Every language that may be used; a catalogue that cannot be read is told, and hides no other."""
+        found = list[Language]()
+        for code in languages(self.folder):
+            try:
+                found.append(language(code, self.folder))
+            except ConfigError as error:
+                say(f"left out: {error}")
         return tuple(one for one in found if one.checked_by or self.unchecked)
 
 
@@ -220,7 +226,7 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
     try:
-        live.lab_day(request, wanted.usable(), _markers)
+        live.lab_day(request, wanted.usable(_say), _markers)
     except KeyboardInterrupt as signalled:
         _say(f"ended by {signalled}")
         raise

@@ -217,6 +217,8 @@ def test_a_catalogue_that_nobody_checked_says_so(tmp_path, nobody):
 NO_CHECKS = (
     *("-", "?", "no one", "niemand", "none yet", "n/a", "TODO", "<initials>", "machine", "A. B.", "2026-02-28"),
     *("?, 2026-02-28", "nobody, 2026-02-28", "A. B., 2026-02-30", "A. B., 28 February 2026"),
+    *("Nobody., 2026-01-01", "nobody yet, 2026-02-28", "no one 2026-02-28", "None, 2026-02-28", "n/a, 2026-02-28"),
+    *("TODO, 2026-02-28", "machine translation, 2026-02-28", "\u202eA. B., 2026-02-28"),
 )
 
 
@@ -227,10 +229,31 @@ def test_what_is_no_word_on_who_checked_and_when_is_refused(tmp_path, said):
         language(LONG, tmp_path)
 
 
-@pytest.mark.parametrize("said", ["张, 2026-02-28", "Ö. 2026-02-28", "J. T. and N. A., both speakers, 2026-02-28"])
+@pytest.mark.parametrize(
+    "said",
+    [
+        "张, 2026-02-28",
+        "Ö. 2026-02-28",
+        "Na Li, 2026-02-28",
+        "Todorova, 2026-02-28",
+        "J. T. and N. A., both speakers, 2026-02-28",
+    ],
+)
 def test_a_check_is_one_in_any_writing(tmp_path, said):
     write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG] | {CHECKED_BY: said})
     assert language(LONG, tmp_path).checked_by == said
+
+
+def test_a_head_that_says_a_thing_twice_is_refused(tmp_path):
+    write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG] | {FONTS.lower(): "Two"})
+    with pytest.raises(ConfigError, match=f"its head says {FONTS.lower()} twice; mend it there"):
+        language(LONG, tmp_path)
+
+
+def test_a_catalogue_whose_lines_end_as_on_an_old_mac_is_read(tmp_path):
+    path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r"))
+    assert language(LONG, tmp_path).code == LONG
 
 
 def test_a_catalogue_that_is_no_file_and_one_for_english_are_refused_by_name(tmp_path):
@@ -273,6 +296,10 @@ def test_a_catalogue_with(say, head, but, said, tmp_path):
     [
         (b"<<<<<<< HEAD\n", r"recoil\.po: line \d+: '<<<<<<< HEAD' is no line of a \.po"),
         (b'msgid "again"\n', r"recoil\.po: line \d+: an entry without its msgstr"),
+        (
+            b'msgid "x"\nmsgstr[0] "y"\n',
+            r"recoil\.po: line \d+: 'x' has a msgstr of plurals and no msgid_plural; mend it",
+        ),
         (b'msgstr "alone"\n', r"recoil\.po: line \d+: an entry without its msgid"),
         (b'msgid "Done"\nmsgstr "twice"\n', r"recoil\.po: line \d+: 'Done' stands there a second time"),
         (b'msgid "x"\nmsgstr "\\q"\n', r"recoil\.po: line \d+: \\q is none of "),
@@ -586,10 +613,21 @@ def test_at_a_terminal_what_is_read_out_is_in_the_language_and_what_is_saved_in_
 
 def test_the_languages_to_choose_from_are_the_checked_ones_unless_it_is_said_otherwise(folder):
     def offered(unchecked):
-        return {one.code for one in LanguageOptions(folder=folder, unchecked=unchecked).usable()}
+        return {one.code for one in LanguageOptions(folder=folder, unchecked=unchecked).usable(left_out.append)}
 
+    left_out = list[str]()
     assert offered(False) == {"en", LONG, RIGHT_TO_LEFT}
     assert offered(True) == {"en", LONG, RIGHT_TO_LEFT, "zh"}
+    assert left_out == []
+
+
+def test_a_catalogue_that_cannot_be_read_is_told_and_hides_no_other(tmp_path):
+    broken = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
+    broken.write_text("no catalogue")
+    left_out = list[str]()
+    assert [one.code for one in LanguageOptions(folder=tmp_path).usable(left_out.append)] == ["en"]
+    (line,) = left_out
+    assert line.startswith(f"left out: {broken}: line 1")
 
 
 @pytest.mark.parametrize("code", [None, "zh"])

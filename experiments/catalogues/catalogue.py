@@ -28,6 +28,8 @@ NAME, FONTS, DIRECTION, CHECKED_BY = "X-Language-Name", "X-Fonts", "X-Direction"
 """The entries in the head of a catalogue that say what gettext does not ask for."""
 NOBODY = "nobody"
 """What the last of them says, where no native speaker has checked the catalogue."""
+_NO_NAMES = re.compile(r"(nobody|no ?one|none|n/a|todo|tbd|unchecked|unknown|machine)\b.*", re.IGNORECASE)
+"""What is written there instead, with a day or without, and is nobody either."""
 _CHECKED = re.compile(r"(.*\w.*?),?\s+(\d{4}-\d{2}-\d{2})")
 """Who checked a catalogue, and on which day: what only fills the place has no day."""
 _COMPILED = ".mo"
@@ -139,15 +141,20 @@ def _of_source(path: Path) -> _Texts:
         texts = texts_of_po(path.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise ValueError(f"is not UTF-8 (byte {error.start}); save it as UTF-8") from error
-    lines = (line.partition(":") for line in texts.pop("", "").split("\n"))
-    return {name.strip().lower(): value.strip() for name, _, value in lines}, lambda text: texts.get(text, "")
+    head = dict[str, str]()
+    for name, _, value in (line.partition(":") for line in filter(None, texts.pop("", "").split("\n"))):
+        key = name.strip().lower()
+        if key in head:
+            raise ValueError(f"its head says {name.strip()} twice")
+        head[key] = value.strip()
+    return head, lambda text: texts.get(text, "")
 
 
 def _compiled(path: Path) -> _Texts:
     data = path.read_bytes()
     try:
         catalogue = gettext.GNUTranslations(io.BytesIO(data))
-    except (OSError, ValueError, struct.error, IndexError) as error:  # what gettext raises for bytes that are none
+    except (OSError, ValueError, struct.error, LookupError) as error:  # what gettext raises for bytes that are none
         raise ValueError(f"is no compiled catalogue ({error})") from error
     catalogue.add_fallback(_Absent())
     return catalogue.info(), catalogue.gettext
@@ -173,9 +180,9 @@ def _checker(said: str) -> str:
         return ""
     found = _CHECKED.fullmatch(said)
     try:
-        if found is not None and found[1].lower() != NOBODY:
+        if found is not None and not _NO_NAMES.fullmatch(found[1]):
             date.fromisoformat(found[2])
-            return said
+            return printable(said)
     except ValueError:
         pass
     raise ValueError(

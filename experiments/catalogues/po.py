@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 _LINE = re.compile(r'(?:(msgctxt|msgid|msgid_plural|msgstr(?:\[\d\])?)\s+)?"((?:[^"\\]|\\.)*)"')
+_LINE_END = re.compile(r"\r\n|\r|\n")
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
 
 
@@ -25,6 +26,8 @@ def texts_of_po(po: str) -> dict[str, str]:
             raise ValueError(f"line {entry.line}: an entry without its {'msgid' if text is None else 'msgstr'}")
         if "msgctxt" in entry.parts or "msgid_plural" in entry.parts or (entry.fuzzy and text):
             continue
+        if "msgstr" not in entry.parts:
+            raise ValueError(f"line {entry.line}: {text!r} has a msgstr of plurals and no msgid_plural")
         if text in found:
             raise ValueError(f"line {entry.line}: {text!r} stands there a second time")
         found[text] = entry.parts["msgstr"]
@@ -42,7 +45,7 @@ class _Entry:
 
 def _entries(po: str) -> Iterator[_Entry]:
     entry, name = _Entry(line=1), ""
-    for number, line in enumerate(map(str.strip, po.split("\n")), 1):
+    for number, line in enumerate(map(str.strip, _LINE_END.split(po)), 1):
         found, comment = _LINE.fullmatch(line), line.startswith("#")
         if line and not comment and (found is None or not (found[1] or name)):
             raise ValueError(f"line {number}: {line!r} is no line of a .po")
