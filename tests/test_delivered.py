@@ -283,7 +283,7 @@ def test_a_sensor_that_can_measure_nothing_is_refused(sensor: str, gun: str, clo
 
 
 class Falters:
-    """A sensor's end that sees no peak (`p`), is silent (`s`), and is over after the last of these letters."""
+    """A sensor's end that sees no peak (`p`), is silent (`s`), has wrong times (`t`), and is over after the last."""
 
     address, silent, dropped, ended = "short:1", False, 3, ""
 
@@ -295,7 +295,7 @@ class Falters:
         self.silent = answer == "s"
         if not answer:
             raise SensorError("short:1: it broke off: EOFError")
-        if self.silent:
+        if answer in "st":
             return ShotReply(number=1, because="the sensor gave no samples of it")
         return ShotReply(number=1, expected=expected_shot(actuator, RATE_HZ))
 
@@ -334,6 +334,13 @@ def test_a_run_goes_on_when_its_sensor_is_silent_or_ends_which_is_said_once(tmp_
     ]
     assert set(notes) <= set(told)
     assert len(told) == len(notes) + 2  # a line for each shot without a peak
+
+
+def test_shots_that_are_not_measured_though_the_sensor_is_heard_are_told_of_once(tmp_path, monkeypatch):
+    contents, told = run_faltering(monkeypatch, tmp_path, short_design(), "ttpttttt")
+    notes = [record.body["text"] for record in contents.records if "noted" in str(record.body)]
+    (one,) = [note for note in notes if note.startswith("The last 3 shots were not measured (the sensor gave no")]
+    assert one in told
 
 
 def test_the_last_word_of_a_sensor_is_in_the_table_and_in_the_hash_however_slow_the_disk(tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from device.plugin.door import own_program
 from device.plugin.guard import PluginError
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorLink
@@ -21,7 +23,7 @@ from device.sensor.process import LOOK_EVERY_S, UNHEARD_S, SampleBuffer, SensorS
 from device.sensor.streams import BAD_LINES, CsvSensor, SensorClock, SensorError, checked_samples
 from tests.delivered_chain import DAMPED, RATE_HZ, stream_written
 from tests.gun_plugins import ACCELEROMETER, install_sensor
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 FRICTION_N = 1.12
 """Of the paper's damper."""
@@ -318,6 +320,27 @@ def test_a_sensor_whose_read_hangs_is_silent_until_it_goes_on_and_no_shot_is_mis
         assert reply.because in ("", "the sensor gave no samples of it") or "gap" in reply.because  # a busy machine
     finally:
         link.close()
+
+
+OPENS = """
+import os, pathlib, time
+def open_sensor(address, clock):
+    pathlib.Path(address).write_text(str(os.getpid()))
+    time.sleep(3600)
+"""
+
+
+@pytest.mark.slow
+def test_a_sensor_that_hangs_while_it_opens_ends_with_who_started_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install_sensor(monkeypatch, tmp_path, OPENS, name="opens", module="opening_sensor")
+    command, environment = own_program("device.sensor", f"opens:{tmp_path / 'there'}")
+    with subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        wait_for((tmp_path / "there").exists)
+        assert child.stdin is not None
+        child.stdin.close()
+        assert child.wait(PATIENCE_S) == 0
 
 
 def shot_of(link: SensorLink) -> DeliveredShot | None:

@@ -34,14 +34,14 @@ FIRST_SAMPLES_S = 5.0
 
 def serve_sensor(address: str, out: int) -> None:
     """Read the sensor, and answer what stdin asks. `DeviceError`, `ValueError`: why it ended."""
+    asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(asked,), daemon=True).start()  # first, as opening may hang
     sensor = open_sensor(address, time.monotonic)
     try:
         buffer, silence = SampleBuffer(), SensorSilence()
         _become_ready(sensor, buffer, silence)
         ready = SensorReady(rate_Hz=buffer.rate_Hz, noise_m_s2=buffer.noise_m_s2())
         os.write(out, said_line(SensorSaid(ready=ready)))
-        asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
-        threading.Thread(target=_listen, args=(asked,), daemon=True).start()
         threading.Thread(target=_watch, args=(sensor, silence, out), daemon=True).start()
         waiting = deque[ShotAsked]()
         while True:

@@ -143,8 +143,9 @@ class SensorLink:
             if self._process.stdin is not None:
                 self._process.stdin.close()
         try:
-            self._process.wait(_ENDED_S)
-        except subprocess.TimeoutExpired:
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(_ENDED_S)
+        finally:  # after an interrupt too
             self._process.kill()
             self._process.wait()
         if self._process.stdout is not None:

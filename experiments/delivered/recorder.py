@@ -19,6 +19,7 @@ from device import Gun, GunStatus, Shot, ShotReport
 from device.methods import Method
 from device.parameters import GunParameters
 from device.sensor.door import check_address
+from device.sensor.expected import NO_COURSE
 from device.sensor.link import SensorEnd, SensorLink
 from device.sensor.measuring import DeliveredShot, ExpectedShot
 from device.sensor.process import ShotReply
@@ -37,6 +38,8 @@ NOTICED_S = 0.25
 """So often it is looked whether the sensor is still heard, and what is to be told of a presentation that is over."""
 SETTLED_S = 8.0
 """So long the end of a run waits for what was measured last."""
+UNMEASURED_SHOTS = 3
+"""So many shots in a row that were not measured are told of."""
 REPEAT_REASON = "not delivered"
 """The reason of every repeat that a sensor asks for begins so."""
 
@@ -94,6 +97,7 @@ class ShotRecorder:
         self._step: Step | None = None
         self._shots = 0
         self._ended = self._silent = False
+        self._unmeasured = 0
         self._undelivered: list[ShotMeasured] = []
         self._latest: ShotFired | None = None
         self._spoiled: Repeated | None = None
@@ -195,6 +199,7 @@ class ShotRecorder:
             self._tell_undelivered()
         self._latest, found = shot, self._measured(shot)
         live.remark(found)
+        self._count_unmeasured(found)
         if found.mark in NOT_DELIVERED:
             self._undelivered.append(found)
             self._want_again(live, found)
@@ -251,6 +256,13 @@ class ShotRecorder:
             found = replace(found, friction_N=round(friction_N, 5), friction_u_N=round(friction_u_N, 5))
         return replace(found, mark=verdict.mark, because=reason_of(verdict, found))
 
+    def _count_unmeasured(self, found: ShotMeasured) -> None:
+        """Tell once of shots that one after another were not measured, though the sensor is heard."""
+        heard = not (self._ended or self._silent or self._end.silent or found.because == NO_COURSE)
+        self._unmeasured = self._unmeasured + 1 if heard and found.mark == "not-measured" else 0
+        if self._unmeasured == UNMEASURED_SHOTS:
+            self._note(_UNMEASURED.format(found.because))
+
     def _want_again(self, live: LiveRun, found: ShotMeasured) -> None:
         """Where the design says so, the trial is to come again, once."""
         before = (word for _, word in live.history if isinstance(word, Repeated) and word.trial == found.trial)
@@ -283,6 +295,10 @@ class ShotRecorder:
 
 _SILENT = "The sensor is silent: no sample comes. The run goes on; its shots are marked “not-measured” until one does."
 _HEARD = "The sensor is heard again."
+_UNMEASURED = (
+    f"The last {UNMEASURED_SHOTS} shots were not measured ({{}}), though the sensor is heard. The run goes on. "
+    "Look at the sensor's times: they must go as seconds do."
+)
 _DROPPED = "Lines of the sensor that were no samples and were left out: {}. Look at its cable."
 
 
