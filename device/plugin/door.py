@@ -118,7 +118,7 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     try:
         gun = answer_within(PLUGIN_OPEN_S, lambda: make(rest, dict(methods), clock))
     except LinkError as error:
-        raise PluginError(f"{address}: {error_line(error)}") from error
+        raise PluginError(f"{address}: {error_line(error) or 'it did not open, and does not say why'}") from error
     except Exception as error:
         raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}") from error
     try:
