@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.record.journal import Record, read_journal
+from experiments.record.journal import JournalError, Record, read_journal
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session import events
 from experiments.session.states import EMERGENCY
@@ -209,6 +209,16 @@ def test_what_a_plug_in_opens_must_be_a_gun(tmp_path, monkeypatch, source, said)
         open_gun("bad:1")
 
 
+def test_a_gun_that_lacks_something_is_disarmed_and_closed_as_far_as_it_can_be(tmp_path, monkeypatch):
+    more = "status = None; disarm = lambda self: 1 / 0; close = lambda self: open('closed', 'w').close()"
+    install(monkeypatch, tmp_path, GUN.format(more=more, made="Gun()"), name="bad", module="bad_gun")
+    monkeypatch.setattr(door, "try_import", lambda _: None)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(PluginError, match=r"Gun has no status; .* could not be disarmed and closed: switch"):
+        open_gun("bad:1")
+    assert (tmp_path / "closed").exists()
+
+
 def test_two_packages_with_one_name_are_both_named(tmp_path, monkeypatch):
     for package in ("one", "two"):
         install(monkeypatch, tmp_path, "", name="same", module=f"{package}_gun", package=package)
@@ -310,72 +320,69 @@ def test_a_kit_that_is_broken_off_lets_go_of_its_gun_at_once_and_opens_no_other(
 
 
 NOTES = """
+import time
 from device.simulated import SimulatedGun
 class Noting(SimulatedGun):
+    deaf = False
     def arm(self): note("arm"); super().arm()
     def fire(self, shot, at_s=None): note("fire"); return super().fire(shot, at_s)
-    def disarm(self): note("disarm"); super().disarm()
+    def disarm(self):
+        note("disarm")
+        if self.deaf and self.status().shots: time.sleep(60)
+        super().disarm()
     def close(self): note("close"); super().close()
 def note(what):
     with open("heard.txt", "a") as file: file.write(what + "\\n")
 def open_gun(address, methods, clock):
-    return Noting(methods, clock)
+    gun = Noting(methods, clock)
+    gun.deaf = address == "deaf"
+    return gun
 """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Doctor:
+    """How it ended, what it said, and what the gun heard."""
+
+    code: int
+    said: str
+    heard: list[str]
+
+
+def interrupted_doctor(patch: pytest.MonkeyPatch, folder: Path, rest: str, *, fired: int, presses: int) -> Doctor:
+    """A doctor that is interrupted so often after so many shots."""
+    install(patch, folder, NOTES, name="notes", module="noting_gun")
+    patch.setenv("PYTHONPATH", str(folder))
+    heard, words = folder / "heard.txt", [RECOIL, "doctor", "--gun", f"notes:{rest}", "--fire", "1000"]
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as doctor:
+        wait_for(lambda: heard.exists() and heard.read_text().count("fire") >= fired)
+        for _ in range(presses):
+            doctor.send_signal(signal.SIGINT)
+            time.sleep(0.1)
+        _, said = doctor.communicate(timeout=PATIENCE_S)
+    return Doctor(code=doctor.returncode, said=said, heard=heard.read_text().split())
 
 
 @pytest.mark.slow
 def test_an_interrupted_doctor_fires_no_more_and_leaves_no_gun_armed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(monkeypatch, tmp_path, NOTES, name="notes", module="noting_gun")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    words = [RECOIL, "doctor", "--gun", "notes:", "--fire", "1000"]
-    heard = tmp_path / "heard.txt"
-    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as doctor:
-        wait_for(lambda: heard.exists() and heard.read_text().count("fire") > 5)
-        doctor.send_signal(signal.SIGINT)
-        _, said = doctor.communicate(timeout=PATIENCE_S)
-    assert (doctor.returncode, said.count("interrupted")) == (130, 1)
-    told = heard.read_text().split()
+    doctor = interrupted_doctor(monkeypatch, tmp_path, "", fired=6, presses=1)
+    assert (doctor.code, doctor.said.count("interrupted")) == (130, 1)
+    told = doctor.heard
     last_fire = len(told) - 1 - told[::-1].index("fire")
     assert {"disarm", "close"} <= set(told[last_fire:])
     assert "arm" not in told[len(told) - 1 - told[::-1].index("disarm") :]
-
-
-DEAF = """
-import time
-from device.simulated import SimulatedGun
-class Deaf(SimulatedGun):
-    fired = False
-    def fire(self, shot, at_s=None):
-        self.fired = True
-        return super().fire(shot, at_s)
-    def disarm(self):
-        if self.fired:
-            with open("heard.txt", "a") as file: file.write("disarm\\n")
-            time.sleep(60)
-        super().disarm()
-def open_gun(address, methods, clock):
-    return Deaf(methods, clock)
-"""
 
 
 @pytest.mark.slow
 def test_a_doctor_that_is_interrupted_again_and_again_says_that_its_gun_may_be_armed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(monkeypatch, tmp_path, DEAF, name="deaf", module="deaf_gun")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    heard = tmp_path / "heard.txt"
-    words = [RECOIL, "doctor", "--gun", "deaf:", "--fire", "1000"]
-    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as doctor:
-        wait_for(lambda: heard.exists() and "disarm" in heard.read_text())
-        for _ in range(3):
-            doctor.send_signal(signal.SIGINT)
-            time.sleep(0.1)
-        _, said = doctor.communicate(timeout=PATIENCE_S)
-    assert "switch off its power" in said
-    assert "Traceback" not in said
+    doctor = interrupted_doctor(monkeypatch, tmp_path, "deaf", fired=1, presses=3)
+    assert doctor.code == 2
+    assert "switch off its power" in doctor.said
+    assert "Traceback" not in doctor.said
 
 
 # what the guard believes, and what it lets through
@@ -671,23 +678,32 @@ def test_a_plug_in_that_cannot_be_closed_leaves_a_finished_run_and_says_to_switc
     assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).finished
 
 
-def test_a_run_that_is_interrupted_says_that_its_gun_could_not_be_closed(
-    tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("broken_off", "before", "last"),
+    [(KeyboardInterrupt(), "", "stopped"), (JournalError("the disk is full"), "the disk is full; ", "step")],
+)
+def test_a_run_that_is_broken_off_says_that_its_gun_could_not_be_closed(  # noqa: PLR0917
+    broken_off: BaseException,
+    before: str,
+    last: str,
+    tmp_path: Path,
+    sound_card: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     import sound_card_gun
 
     def jammed(_: object) -> None:
         raise OSError("the card is jammed")
 
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
+    def break_off(*_: object) -> None:
+        raise broken_off
 
     monkeypatch.setattr(sound_card_gun.SoundCardGun, "close", jammed)
-    monkeypatch.setattr(SyntheticScreen, "act", interrupt)
+    monkeypatch.setattr(SyntheticScreen, "act", break_off)
     request = runs.RunRequest(setup=load_setup("preference"), participant_id="P01", results=tmp_path, gun=sound_card)
-    with pytest.raises(RunStopped, match=r"^the gun did not close \(.*card is jammed\): switch off its power$"):
+    with pytest.raises(RunStopped, match=rf"^{before}the gun did not close \(.*jammed\): switch off its power$"):
         runs.run(request, synthetic_screen, RealClock(50.0))
-    assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).records[-1].kind == "stopped"
+    assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).records[-1].kind == last
 
 
 def test_a_plug_in_that_hangs_in_a_shot_stops_the_run_which_says_to_switch_off_its_power(

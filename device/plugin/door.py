@@ -129,14 +129,15 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
 
 
 def _put_away(gun: object) -> str:
-    """Disarm and close what lacks something; what is to be said where that cannot be done."""
-    try:
-        with interrupts_held():
-            for command in ("disarm", "close"):
+    """Disarm and close what lacks something, as far as it can; what is to be said where it cannot."""
+    failed = ""
+    with interrupts_held():
+        for command in ("disarm", "close"):
+            try:
                 answer_within(DISARM_S, getattr(gun, command))
-    except Exception:  # noqa: BLE001 - a plug-in may do anything
-        return "; it could not be disarmed and closed: switch off its power"
-    return ""
+            except Exception:  # noqa: BLE001 - a plug-in may do anything
+                failed = "; it could not be disarmed and closed: switch off its power"
+    return failed
 
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:

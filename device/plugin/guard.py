@@ -160,12 +160,12 @@ class GuardedGun:
         self.name = name
         self._gun, self._methods, self._clock = gun, MappingProxyType(dict(methods)), clock
         self._turn = threading.Lock()  # of arm and fire
-        self._told = threading.Condition()  # guards the five below
+        self._told = threading.Condition()  # guards the four below
         self._armed = self._closed = False
-        self._gone: bool | None = None  # once closed: whether it was let go of
         self._disarms = 0
         self._silent = ""  # the call that it never answered
         self._disarm_s = DISARM_S
+        self._gone = Future[None]()  # what became of its closing
         self._history = DriveHistory()
         try:
             self._check_disarmed("when it is opened; a gun is born disarmed")
@@ -235,10 +235,10 @@ class GuardedGun:
                 return
             try:
                 self._let_go()
-                self._tell_gone(True)
-            except BaseException:
-                self._tell_gone(False)
+            except BaseException as error:
+                self._gone.set_exception(error)
                 raise
+            self._gone.set_result(None)
 
     def _let_go(self) -> None:
         try:
@@ -246,17 +246,11 @@ class GuardedGun:
         finally:
             self._ask("close", self._gun.close)
 
-    def _tell_gone(self, gone: bool) -> None:
-        with self._told:
-            self._gone = gone
-            self._told.notify_all()
-
     def _check_gone(self) -> None:
         """What became of a closing, which may be under way."""
-        with self._told:
-            self._told.wait_for(lambda: self._gone is not None, DISARM_S)
-            if not self._gone:
-                raise PluginError(f"gun plug-in {self.name} was not disarmed and closed")
+        wait_awake(self._gone, DISARM_S)
+        if not self._gone.done() or self._gone.exception():
+            raise PluginError(f"gun plug-in {self.name} was not disarmed and closed")
 
     # what is asked of the plug-in
 

@@ -85,10 +85,10 @@ def _wait_ready(lines: queue.SimpleQueue[str], say: _Tell) -> bool:
 
 
 def _is_ready(said: str, say: _Tell) -> bool:
-    """Whether a child that said something first may send; what else it says is told."""
+    """Whether a child that said this first may send; what else it says is told."""
     if said != _READY:
         say(said or "no markers: their process ended at once")
-    return said.startswith((_READY, _PROBLEM))
+    return said == _READY or said.startswith(_PROBLEM)
 
 
 def _end(child: subprocess.Popen[str], lines: queue.SimpleQueue[str], tell: _Tell, left_s: float) -> None:
@@ -99,7 +99,8 @@ def _end(child: subprocess.Popen[str], lines: queue.SimpleQueue[str], tell: _Tel
     hung = not _ended(child, left_s)
     with suppress(queue.Empty):
         while said := lines.get(timeout=left_s):
-            _is_ready(said, tell)
+            if said != _READY:
+                tell(said)
     if hung:
         tell("markers: their process hung and was ended; some may not have been sent, and the journal is whole")
     elif child.returncode not in (0, 2):
