@@ -588,6 +588,8 @@ def test_a_gun_that_is_not_disarmed_is_told_of_whatever_interrupts(clock, hangup
     gun, _ = guarded(clock, disarms=hangups.press, stays_armed=True)
     with pytest.raises(PluginError, match="is armed after it was disarmed; switch off its power"):
         gun.close()
+    with pytest.raises(PluginError, match="was not disarmed and closed"):
+        gun.status()  # which a window shows
 
 
 def test_who_closes_a_gun_that_another_is_closing_learns_what_became_of_it(clock, monkeypatch):

@@ -217,8 +217,12 @@ class GuardedGun:
             self._check_disarmed("after it was disarmed; switch off its power")
 
     def status(self) -> GunStatus:
-        """The gun at this moment, never readier or cooler than by the guard's own count."""
+        """The gun at this moment, never readier or cooler than by the guard's own count.
+
+        `LinkError`: it does not answer, or was closed and may be armed still.
+        """
         if self._closed:
+            self._check_gone()
             return self._status(GunStatus(state="disarmed", shots=0, coil_temperature_C=0.0, ready_at_s=0.0))
         found = self._status(_checked_status(self.name, self._ask("status", self._gun.status), self._clock()))
         if found.state in {"armed", "resetting"} and not self._armed:
