@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import signal
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -89,6 +90,8 @@ class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
 
 
+INTERRUPTS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""The signals that end a command in order; not every system knows all three."""
 AWAKE_S = 0.2
 """Who may wait long looks up so often. On Linux a thread that is being started may take a signal that was meant for the
 main thread, which then sleeps on: Ctrl+C would do nothing until it wakes.

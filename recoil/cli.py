@@ -15,7 +15,7 @@ import typer
 import recoil
 from analysis.report.streams import forgive_streams, keep_results_apart
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
-from device.words import RecoilError, few_of_each
+from device.words import INTERRUPTS, RecoilError, few_of_each
 from recoil.commands import archives, guns, numbers, predictions, sessions
 
 app = typer.Typer(
@@ -94,9 +94,8 @@ def main() -> None:
     for name, value in _OF_LIBRARIES.items():
         os.environ.setdefault(name, value)
     os.umask(0o077)  # what is written here is about people: for its owner alone
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):  # not every system knows all three
-            signal.signal(getattr(signal, name), _interrupt)
+    for number in INTERRUPTS:
+        signal.signal(number, _interrupt)
     try:
         _line_of(sys.argv[1:])()
     except KeyboardInterrupt:
@@ -108,6 +107,7 @@ def main() -> None:
         say("\n".join(f"recoil: {line}" for line in few_of_each(str(error).splitlines())))
         sys.exit(UNUSABLE)
     finally:
+        _leave_signals()
         gc.freeze()  # what is left goes with the process; looking through it at the end took a sixth of `check`
 
 
@@ -122,6 +122,12 @@ def _line_of(words: Sequence[str]) -> typer.Typer:
     line = copy(app)
     line.registered_commands, line.registered_groups = asked, []
     return line
+
+
+def _leave_signals() -> None:
+    """The rest is Python's own end, which an interrupt may cut short without a word."""
+    for number in INTERRUPTS:
+        signal.signal(number, signal.SIG_DFL)
 
 
 def _interrupt(number: int, _: object) -> None:

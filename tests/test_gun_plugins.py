@@ -219,6 +219,14 @@ def test_a_gun_that_lacks_something_is_disarmed_and_closed_as_far_as_it_can_be(t
     assert (tmp_path / "closed").exists()
 
 
+def test_an_interrupt_does_not_hide_that_what_lacks_something_may_be_armed(tmp_path, monkeypatch, hangups):
+    more = "status = None; disarm = lambda self: __import__('os').kill(__import__('os').getpid(), 1) or 1 / 0"
+    install(monkeypatch, tmp_path, GUN.format(more=more, made="Gun()"), name="bad", module="bad_gun")
+    monkeypatch.setattr(door, "try_import", lambda _: None)
+    with pytest.raises(PluginError, match=r"Gun has no status; .* switch off its power"):
+        open_gun("bad:1")
+
+
 def test_two_packages_with_one_name_are_both_named(tmp_path, monkeypatch):
     for package in ("one", "two"):
         install(monkeypatch, tmp_path, "", name="same", module=f"{package}_gun", package=package)
@@ -323,19 +331,22 @@ NOTES = """
 import time
 from device.simulated import SimulatedGun
 class Noting(SimulatedGun):
-    deaf = False
+    deaf = slow = False
     def arm(self): note("arm"); super().arm()
     def fire(self, shot, at_s=None): note("fire"); return super().fire(shot, at_s)
     def disarm(self):
         note("disarm")
         if self.deaf and self.status().shots: time.sleep(60)
+        if self.slow: time.sleep(1)
         super().disarm()
+        note("disarmed")
     def close(self): note("close"); super().close()
 def note(what):
     with open("heard.txt", "a") as file: file.write(what + "\\n")
 def open_gun(address, methods, clock):
     gun = Noting(methods, clock)
-    gun.deaf = address == "deaf"
+    gun.deaf, gun.slow = address == "deaf", address == "slow"
+    if gun.slow: gun.arm()
     return gun
 """
 
@@ -349,13 +360,15 @@ class Doctor:
     heard: list[str]
 
 
-def interrupted_doctor(patch: pytest.MonkeyPatch, folder: Path, rest: str, *, fired: int, presses: int) -> Doctor:
-    """A doctor that is interrupted so often after so many shots."""
+def interrupted_doctor(
+    patch: pytest.MonkeyPatch, folder: Path, rest: str, *, word: str, times: int, presses: int
+) -> Doctor:
+    """A doctor that is interrupted so often once its gun has heard a word so many times."""
     install(patch, folder, NOTES, name="notes", module="noting_gun")
     patch.setenv("PYTHONPATH", str(folder))
     heard, words = folder / "heard.txt", [RECOIL, "doctor", "--gun", f"notes:{rest}", "--fire", "1000"]
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as doctor:
-        wait_for(lambda: heard.exists() and heard.read_text().count("fire") >= fired)
+        wait_for(lambda: heard.exists() and heard.read_text().split().count(word) >= times)
         for _ in range(presses):
             doctor.send_signal(signal.SIGINT)
             time.sleep(0.1)
@@ -367,7 +380,7 @@ def interrupted_doctor(patch: pytest.MonkeyPatch, folder: Path, rest: str, *, fi
 def test_an_interrupted_doctor_fires_no_more_and_leaves_no_gun_armed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    doctor = interrupted_doctor(monkeypatch, tmp_path, "", fired=6, presses=1)
+    doctor = interrupted_doctor(monkeypatch, tmp_path, "", word="fire", times=6, presses=1)
     assert (doctor.code, doctor.said.count("interrupted")) == (130, 1)
     told = doctor.heard
     last_fire = len(told) - 1 - told[::-1].index("fire")
@@ -379,9 +392,18 @@ def test_an_interrupted_doctor_fires_no_more_and_leaves_no_gun_armed(
 def test_a_doctor_that_is_interrupted_again_and_again_says_that_its_gun_may_be_armed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    doctor = interrupted_doctor(monkeypatch, tmp_path, "deaf", fired=1, presses=3)
+    doctor = interrupted_doctor(monkeypatch, tmp_path, "deaf", word="fire", times=1, presses=3)
     assert doctor.code == 2
     assert "switch off its power" in doctor.said
+    assert "Traceback" not in doctor.said
+
+
+@pytest.mark.slow
+def test_a_doctor_that_is_interrupted_while_it_refuses_an_armed_gun_disarms_and_closes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    doctor = interrupted_doctor(monkeypatch, tmp_path, "slow", word="disarm", times=1, presses=2)
+    assert doctor.heard[-3:] == ["close", "disarm", "disarmed"]  # the simulated gun disarms again as it closes
     assert "Traceback" not in doctor.said
 
 

@@ -259,6 +259,10 @@ def test_a_catalogue_whose_lines_end_as_on_an_old_mac_is_read(tmp_path):
 def test_a_catalogue_that_is_no_file_and_one_for_english_are_refused_by_name(tmp_path):
     path = write_catalogue(tmp_path, LONG, SAID[LONG], HEADS[LONG])
     path.unlink()
+    path.symlink_to(path.name)
+    with pytest.raises(ConfigError, match=r"recoil\.po: is no file"):
+        language(LONG, tmp_path)
+    path.unlink()
     os.mkfifo(path)
     with pytest.raises(ConfigError, match=r"recoil\.po: is no file"):
         language(LONG, tmp_path)
@@ -303,7 +307,7 @@ def test_a_catalogue_with(say, head, but, said, tmp_path):
         (b'msgstr "alone"\n', r"recoil\.po: line \d+: an entry without its msgid"),
         (b'msgid "Done"\nmsgstr "twice"\n', r"recoil\.po: line \d+: 'Done' stands there a second time"),
         (b'msgid "x"\nmsgstr "\\q"\n', r"recoil\.po: line \d+: \\q is none of "),
-        (b"# \xd6\n", r"recoil\.po: is not UTF-8 \(byte \d+\); save it as UTF-8"),
+        (b"# \xd6\n", r"recoil\.po: line \d+: is not UTF-8 \(byte \d+\); save it as UTF-8"),
     ],
 )
 def test_a_source_with_what_cannot_be_read_is_refused_by_file_and_line(more, said, tmp_path):

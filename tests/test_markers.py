@@ -191,6 +191,7 @@ def resolve_bypred(*_): return {found}
         ({"push": "time.sleep(3600)"}, "markers: their process hung and was ended; some may not have been sent"),
         ({"push": "__import__('os')._exit(7)"}, "markers: their process broke off (exit code 7)"),
         ({"found": "None"}, "no markers: Lab Streaming Layer broke off (TypeError: object of type 'NoneType'"),
+        ({"found": "exit(3)"}, "no markers: Lab Streaming Layer broke off (SystemExit: 3)"),
         ({"clock": "float('nan')"}, "is not what it should be (ValueError: its clock gives nan)"),
     ],
 )

@@ -129,24 +129,35 @@ def rig_at(
 
 
 class OpenedGuns:
-    """The guns that a kit opens one after another: broken off from another thread, none stays armed."""
+    """The guns that are opened one after another: broken off from another thread, none stays armed."""
 
     def __init__(self, open_gun: Callable[[], Gun]) -> None:
         self._open_gun = open_gun
         self._lock = threading.Lock()
         self._guns: list[Gun] = []
-        self._over = False
-        self.problem = ""
-        """Why the last gun may be armed still."""
+        self._over = self._opening = False
+        self._failed = ""
+
+    @property
+    def problem(self) -> str:
+        """Why a gun may be armed still; empty if none is."""
+        return "it was being opened: switch off its power" if self._opening else self._failed
 
     def open(self) -> Gun:
         """The next gun. `LinkError`: it is over."""
-        gun = self._open_gun()
-        with self._lock:
-            if not self._over:
-                self._guns.append(gun)
-                return gun
-        gun.close()
+        self._opening = True
+        try:
+            gun = self._open_gun()
+            with self._lock:
+                if not self._over:
+                    self._guns.append(gun)
+                    return gun
+            self._close(gun)
+        except DeviceError as error:  # after the end nobody hears of it
+            self._failed = str(error) if self._over else ""
+            raise
+        finally:
+            self._opening = False
         raise LinkError("the tries were broken off")
 
     def let_go(self) -> None:
@@ -155,10 +166,13 @@ class OpenedGuns:
             with self._lock:
                 self._over = True
             for gun in self._guns:
-                try:
-                    gun.close()
-                except DeviceError as error:
-                    self.problem = f"{error}: switch off its power"
+                self._close(gun)
+
+    def _close(self, gun: Gun) -> None:
+        try:
+            gun.close()
+        except DeviceError as error:
+            self._failed = f"{error}: switch off its power"
 
 
 def _untold(_: ConformanceFinding) -> None:

@@ -124,20 +124,22 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     try:
         check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")
     except PluginError as error:
-        raise PluginError(f"{error}{_put_away(gun)}") from error
+        _put_away(gun, error)
+        raise
     return GuardedGun(name, cast("Gun", gun), methods, clock)
 
 
-def _put_away(gun: object) -> str:
-    """Disarm and close what lacks something, as far as it can; what is to be said where it cannot."""
-    failed = ""
+def _put_away(gun: object, why: PluginError) -> None:
+    """Disarm and close what lacks something, as far as it can. `PluginError`: it may be armed still."""
+    failed = False
     with interrupts_held():
         for command in ("disarm", "close"):
             try:
                 answer_within(DISARM_S, getattr(gun, command))
             except Exception:  # noqa: BLE001 - a plug-in may do anything
-                failed = "; it could not be disarmed and closed: switch off its power"
-    return failed
+                failed = True
+        if failed:
+            raise PluginError(f"{why}; it could not be disarmed and closed: switch off its power") from why
 
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:

@@ -21,6 +21,7 @@ from device.limits import DriveHistory, planned_start_s
 from device.methods import Method, Rendering, rendering_of
 from device.words import (
     AWAKE_S,
+    INTERRUPTS,
     Gun,
     GunStatus,
     Identity,
@@ -87,9 +88,6 @@ def begun_aside(act: Callable[[], _Answer], name: str) -> Future[_Answer]:
     return done
 
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-
-
 def start_aside(act: Callable[[], None], name: str) -> None:
     """A thread that ends with the program, and takes no signal that is meant for the main thread (see `AWAKE_S`).
 
@@ -99,7 +97,7 @@ def start_aside(act: Callable[[], None], name: str) -> None:
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         thread.start()
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         thread.start()
     finally:
@@ -117,7 +115,7 @@ def interrupts_held() -> Iterator[None]:
         return
     came, before = list[int](), dict[int, Callable[[int, FrameType | None], object] | int | None]()
     try:
-        for number in _SIGNALS:
+        for number in INTERRUPTS:
             before[number] = signal.signal(number, lambda it, _: came.append(it))
         yield
     finally:

@@ -69,8 +69,8 @@ def languages(folder: Path | None = None) -> dict[str, Path | None]:
     """The languages that there are, with their files: a lab's before those that come along. English has none."""
     found: dict[str, Path | None] = {ENGLISH.code: None}
     for place in filter(None, (SHIPPED, folder)):
-        for kind in (_COMPILED, ".po"):
-            found |= {path.parts[-3]: path for path in sorted(place.glob(f"*/LC_MESSAGES/{DOMAIN}{kind}"))}
+        for kind in (_COMPILED, ".po"):  # in brackets, as a name without a pattern hides a link that leads nowhere
+            found |= {path.parts[-3]: path for path in sorted(place.glob(f"*/LC_MESSAGES/{DOMAIN}[.]{kind[1:]}"))}
     return found
 
 
@@ -138,9 +138,10 @@ _Texts = tuple[Mapping[str, str], Callable[[str], str]]
 
 def _of_source(path: Path) -> _Texts:
     try:
-        texts = texts_of_po(path.read_bytes().decode("utf-8-sig"))
+        texts = texts_of_po((data := path.read_bytes()).decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise ValueError(f"is not UTF-8 (byte {error.start}); save it as UTF-8") from error
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"line {line}: is not UTF-8 (byte {error.start}); save it as UTF-8") from error
     head = dict[str, str]()
     for name, _, value in (line.partition(":") for line in filter(None, texts.pop("", "").split("\n"))):
         key = name.strip().lower()

@@ -25,11 +25,11 @@ from typing import IO, TypeVar
 
 from pydantic import TypeAdapter
 
-from device import DeviceError, open_gun
+from device import DeviceError, Gun, open_gun
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
-from device.plugin.guard import PluginError, begun_aside, wait_awake
+from device.plugin.guard import PluginError, begun_aside, interrupts_held, wait_awake
 from device.serial_gun.gun import SCHEME, speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
@@ -145,16 +145,9 @@ ADAPTERS = Path("/sys/bus/usb-serial/devices")
 """Where Linux shows them; nowhere else."""
 
 
-def gun_line(address: str) -> GunLine:
-    """Ask the gun who it is and how it stands, many times.
-
-    `DeviceError` if it does not answer; `PlaceError` if there is no such form of address.
-    """
-    try:
-        gun = open_gun(address, clock=RealClock(speed_of(address) or 1.0).now)
-    except ValueError as error:
-        raise PlaceError(f"--gun {address}: {error}") from error
-    with closing(gun):
+def gun_line(opened: Callable[[], Gun]) -> GunLine:
+    """Ask a gun who it is and how it stands, many times. `DeviceError` if it does not answer."""
+    with closing(opened()) as gun:
         name = gun_name(gun.identify())
         gun.disarm()
         times = timed_ms(ROUND_TRIPS, gun.status)
@@ -264,8 +257,9 @@ def _disk(results: Path) -> tuple[DoctorFinding, ...]:
 def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
     ours = address == "simulated" or address.startswith(SCHEME)
     seconds = DEADLINE_S if ours else DEADLINE_S + IMPORT_S + PLUGIN_OPEN_S
+    guns = OpenedGuns(lambda: open_gun(address, clock=RealClock(speed_of(address) or 1.0).now))
     try:
-        return (verdicts.of_link(within_seconds(seconds, partial(gun_line, address)), limit_s),)
+        return (verdicts.of_link(_tried(address, seconds, guns, partial(gun_line, guns.open)), limit_s),)
     except PluginError as error:
         return (verdicts.of_failure("gun", str(error)),)
     except (DeviceError, OSError) as error:
@@ -285,7 +279,16 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
     guns, found = OpenedGuns(rig.open_gun), list[ConformanceFinding]()
     rig = replace(rig, open_gun=guns.open)
     try:
-        within_seconds((trials + 20) * SHOT_S + DEADLINE_S, lambda: conformance(rig, found.append), guns.let_go)
+        _tried(address, (trials + 20) * SHOT_S + DEADLINE_S, guns, lambda: conformance(rig, found.append))
+    except TimeoutError as error:
+        found.append(ConformanceFinding(check="time", kept=False, said=str(error)))
+    return (verdicts.of_conformance(found),)
+
+
+def _tried(address: str, seconds: float, guns: OpenedGuns, work: Callable[[], _Result]) -> _Result:
+    """What comes of work with guns, let go of where it is broken off. `PlaceError` names one that is not."""
+    try:
+        return within_seconds(seconds, work, guns.let_go)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
     except KeyboardInterrupt:
@@ -293,9 +296,7 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
             raise PlaceError(f"--gun {address}: interrupted; {guns.problem}") from None
         raise
     except TimeoutError as error:
-        late = ConformanceFinding(check="time", kept=False, said=f"{error}; {guns.problem or 'it was let go of'}")
-        return (verdicts.of_conformance((*found, late)),)
-    return (verdicts.of_conformance(found),)
+        raise TimeoutError(f"{error}; {guns.problem or 'it was let go of'}") from error
 
 
 def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[DoctorFinding, ...]:
@@ -374,8 +375,9 @@ def within_seconds(seconds: float, work: Callable[[], _Result], stop: Callable[[
     try:
         wait_awake(done, seconds)
     except KeyboardInterrupt:
-        stop()
-        wait_awake(done, PUT_AWAY_S)  # so that it can close and remove what it opened
+        with interrupts_held():
+            stop()
+            wait_awake(done, PUT_AWAY_S)  # so that it can close and remove what it opened
         raise
     if not done.done():
         stop()

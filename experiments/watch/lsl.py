@@ -87,8 +87,12 @@ class MarkerOutlets:
             ]
             self._clock, self._next_s = self._mapped(), 0.0
         except RuntimeError as error:
-            raise NoStreams(f"Lab Streaming Layer makes no stream ({error}): look at this machine's network") from error
-        except Exception as error:  # something else by its name
+            raise NoStreams(
+                f"Lab Streaming Layer makes no stream ({error_line(error)}): look at this machine's network"
+            ) from error
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # something else by its name
             where = getattr(pylsl, "__file__", None) or "pylsl"
             raise NoStreams(f"{where}: is not what it should be ({said_by(error)}): {_INSTALL}") from error
 
@@ -145,7 +149,9 @@ def _of_library() -> Iterator[None]:
     """`NoStreams` for whatever the library raises."""
     try:
         yield
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         raise NoStreams(
             f"Lab Streaming Layer broke off ({said_by(error)}): what follows is not sent; the journals are whole"
         ) from error
