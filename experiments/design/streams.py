@@ -1,7 +1,7 @@
 """Named random streams: one a purpose, so that a draw added for one purpose changes no other.
 
-The bits are those of numpy's PCG64 seeded through SeedSequence, whose raw output numpy promises never to change. What
-is made of them (integers, shuffles, uniform and normal numbers) is spelled out here for the same reason.
+The bits are those of numpy's PCG64 seeded through SeedSequence (`bits`), which numpy promises never to change. What is
+made of them (integers, shuffles, uniform and normal numbers) is spelled out here for the same reason.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ import hashlib
 import secrets
 from collections.abc import Sequence
 from statistics import NormalDist
-from typing import TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, TypeVar
 
 from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json
+from experiments.design.bits import Pcg64
+
+if TYPE_CHECKING:
+    import numpy as np
 
 Item = TypeVar("Item")
 
@@ -43,10 +45,7 @@ class Stream:
     """
 
     def __init__(self, seed: int, *purpose: str) -> None:
-        self._bits = _bits(seed, purpose)
-
-    def _raw(self) -> int:
-        return int(self._bits.random_raw())
+        self._raw = Pcg64(_name(seed, purpose)).draw
 
     def below(self, bound: int) -> int:
         """An integer from 0 to `bound` - 1, all equally likely (rejection of the incomplete last cycle)."""
@@ -75,9 +74,11 @@ class Stream:
 
 def generator(seed: int, *purpose: str) -> np.random.Generator:
     """Numpy's own generator on a named stream, for large arrays; numpy may change its draws between versions."""
-    return np.random.Generator(_bits(seed, purpose))
+    import numpy as np  # noqa: PLC0415 - slow, and whoever draws a few numbers needs none of it
+
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(_name(seed, purpose))))
 
 
-def _bits(seed: int, purpose: tuple[str, ...]) -> np.random.PCG64:
-    name = hashlib.sha256(canonical_json([seed, *purpose])).digest()
-    return np.random.PCG64(np.random.SeedSequence(int.from_bytes(name, "big")))
+def _name(seed: int, purpose: tuple[str, ...]) -> int:
+    """What tells one stream from all others, in 256 bits."""
+    return int.from_bytes(hashlib.sha256(canonical_json([seed, *purpose])).digest(), "big")
