@@ -10,15 +10,8 @@ from numpy.typing import ArrayLike
 
 from analysis.times.likelihood import Trials, trials_of
 from experiments.design.streams import Stream, generator
-from experiments.synthetic.diffusion import (
-    Bools,
-    Decision,
-    Diffusion,
-    Floats,
-    crossing_times,
-    decide,
-    upper_probabilities,
-)
+from experiments.synthetic.decision import Bools, Floats, crossing_times, decide, upper_probabilities
+from experiments.synthetic.diffusion import Decision, Diffusion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

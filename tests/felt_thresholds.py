@@ -19,9 +19,10 @@ from experiments.design.config import DesignConfig
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.laws import SyntheticAnswers
-from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percept_of
+from experiments.synthetic.percept import PerceptParameters, evidence, percept_of
 from tests.designs import changed
 
 VOLTAGES = np.arange(2.0, 24.01, 0.5)

@@ -31,15 +31,9 @@ from device.parameters import GunParameters
 from device.physics import simulate, trace
 from device.physics.equations import HOME
 from device.words import LimitError, Pulse
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import (
-    Percept,
-    PerceptParameters,
-    evidence,
-    forward_rates,
-    percept_of_summary,
-    percept_of_trace,
-)
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percept_of_summary, percept_of_trace
 
 DEFAULT = PerceptParameters()
 GUN = GunParameters()

@@ -12,7 +12,8 @@ from scipy.stats import kstwo
 
 from analysis.times.first_passage import distribution, moments
 from experiments.design.streams import Stream, generator
-from experiments.synthetic.diffusion import Diffusion, Lapses, People, decide, person, upper_probabilities
+from experiments.synthetic.decision import decide, upper_probabilities
+from experiments.synthetic.diffusion import Diffusion, Lapses, People, person
 from tests.decisions import EXTREMES, decide_all, law, scalar
 
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]

@@ -22,10 +22,11 @@ from experiments.design.planning import plan_of
 from experiments.design.streams import Stream
 from experiments.load import load_setup, shipped_folder
 from experiments.synthetic.answers import GivenAnswer, synthetic_participant_of
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import Lapses, People
 from experiments.synthetic.laws import AppealLaw, DiffusionLaw, RatingsLaw, SyntheticAnswers
 from experiments.synthetic.model_based import rates_by_instruction
-from experiments.synthetic.percept import Percept, evidence, forward_rates, percepts_of
+from experiments.synthetic.percept import Percept, evidence, percepts_of
 from experiments.synthetic.preference import feelings, felt_ratings
 from tests.conftest import Recoil
 from tests.designs import merged

@@ -14,7 +14,8 @@ from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, best_per
 from device.methods import paper_methods
 from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate, trace
-from experiments.synthetic.diffusion import Diffusion, Lapses, People, upper_probabilities
+from experiments.synthetic.decision import forward_rates, upper_probabilities
+from experiments.synthetic.diffusion import Diffusion, Lapses, People
 from experiments.synthetic.percept import (
     SILENT,
     Percept,
@@ -22,7 +23,6 @@ from experiments.synthetic.percept import (
     diffusion_of,
     evidence,
     felt_course,
-    forward_rates,
     percept_of,
     percept_of_summary,
     percepts_of,

@@ -21,9 +21,9 @@ from experiments.design.planning import plan_of
 from experiments.design.streams import generator
 from experiments.load import load_setup, shipped_folder
 from experiments.synthetic.answers import synthetic_participant_of
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.laws import DiffusionLaw
-from experiments.synthetic.percept import forward_rates
 from tests.conftest import Recoil
 from tests.power_chain import homogeneity_p
 

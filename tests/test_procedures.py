@@ -9,8 +9,8 @@ from hypothesis import strategies as some
 from scipy.special import ndtr
 from scipy.stats import norm
 
+from experiments.design.language import Shape
 from experiments.design.procedures import posterior, psychometric
-from experiments.design.procedures.psychometric import Shape
 from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown, track_after, track_of
 
 WIDE = LevelRange(low=-1e6, high=1e6)

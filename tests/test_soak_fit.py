@@ -22,8 +22,9 @@ from analysis.report.copies import cores
 from device.methods import paper_methods
 from experiments.design.streams import generator
 from experiments.load import load_setup
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import PerceptParameters, evidence, forward_rates, percepts_of
+from experiments.synthetic.percept import PerceptParameters, evidence, percepts_of
 from tests.conftest import RECOIL, Soak
 from tests.felt_configs import felt_config
 from tests.power_chain import counted, said, through_the_chain

@@ -22,10 +22,11 @@ from analysis.stats.arrays import FloatArray
 from device.words import DIRECTIONS, Direction
 from experiments.config.setup import GunConfig
 from experiments.design.streams import generator
-from experiments.synthetic.diffusion import People, upper_probabilities
+from experiments.synthetic.decision import own_start, upper_probabilities
+from experiments.synthetic.diffusion import People
 from experiments.synthetic.laws import DiffusionLaw, RatesLaw, RatingsLaw
 from experiments.synthetic.model_based import NEUTRAL
-from experiments.synthetic.percept import Percept, evidence, own_start, percepts_of
+from experiments.synthetic.percept import Percept, evidence, percepts_of
 from experiments.tasks.questions import Scale
 
 Counts = NDArray[np.int64]

@@ -16,7 +16,8 @@ from analysis.psychometric.priors import Priors, default_priors
 from analysis.report.serial import UNWRITTEN
 from analysis.stats.arrays import FloatArray, in_brief, numbers, one_of, share, single, yes_or_no
 from analysis.stats.frames import Result
-from experiments.design.procedures.psychometric import Shape, share_felt
+from experiments.design.language import Shape
+from experiments.design.procedures.psychometric import share_felt
 
 _DRAWS = 4000
 """Draws from the posterior, for what follows from several parameters at once."""

@@ -15,7 +15,8 @@ from scipy.special import betaln, xlog1py, xlogy
 
 from analysis.psychometric.priors import Priors
 from analysis.stats.arrays import FloatArray
-from experiments.design.procedures.psychometric import Shape, share_felt
+from experiments.design.language import Shape
+from experiments.design.procedures.psychometric import share_felt
 
 _NODES = 512
 """Shares at which a level's likelihood is tabulated, evenly in arcsin √p, where it is smooth: an error below 1e-3."""

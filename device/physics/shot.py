@@ -8,10 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from operator import attrgetter
-from typing import Any
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from typing import TYPE_CHECKING, Any
 
 from device.limits import TICKS
 from device.parameters import GunParameters
@@ -61,6 +58,9 @@ from device.physics.polynomial import (
     value_at,
 )
 from device.physics.segments import advance, enter, pulse_off, pulse_on
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
 
 SAME_FORCE = 1e-14  # relative: forces closer than this are one
 _NARROWEST = 1e-6  # of a step: no two peaks of the force lie closer
@@ -313,4 +313,6 @@ def highest_rate_Hz(gun: GunParameters) -> float:  # noqa: N802 - the unit ends 
 
 def rates_of_periods_Hz(period_s: ArrayLike) -> NDArray[Any]:  # noqa: N802 - the unit ends the name
     """The rates of shots that far apart or, as onsets are whole microseconds, a little further."""
+    import numpy as np  # noqa: PLC0415 - slow, and one shot needs none of it
+
     return np.asarray(TICKS / np.ceil(np.asarray(period_s) * TICKS))

@@ -26,6 +26,8 @@ Levels = tuple[Level, ...]
 DurationSeconds = Annotated[float, Field(gt=0, le=86_400)]
 PauseSeconds = Annotated[float, Field(ge=0, le=86_400)]
 ShotCount = Annotated[int, Field(ge=1, le=10_000)]
+Shape = Literal["normal", "logistic", "gumbel", "reversed-gumbel"]
+"""Of a psychometric function."""
 
 METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL = (
     "method",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from itertools import pairwise, product
 from math import log, log2
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from experiments.design.language import (
     DRIVEN,
@@ -27,9 +26,10 @@ from experiments.design.procedures.config import (
     UpDownConfig,
     starts_of,
 )
-from experiments.design.procedures.psychometric import Shares
-from experiments.design.procedures.surface import threshold_along
 from experiments.design.procedures.walks import NumericLevels, are_even, level_range, walk_rule
+
+if TYPE_CHECKING:
+    from experiments.design.procedures.psychometric import Shares
 
 _LARGEST_GRID = 6_000_000
 """Stimuli times places of the parameters' grid: so much is gone through in 20 ms (measured)."""
@@ -361,6 +361,10 @@ def _threshold_problems(table: PosteriorConfig, levels: Sequence[NumericLevels])
 
 def _thresholds(table: PosteriorConfig, levels: Sequence[NumericLevels]) -> tuple[Shares, Shares]:
     """The thresholds of the prior (places, levels of the second factor, or 1), and the places' weights."""
+    import numpy as np  # noqa: PLC0415 - slow, and a design without such a procedure needs none of it
+
+    from experiments.design.procedures.surface import threshold_along  # noqa: PLC0415 - as above
+
     values = table.scaled(table.threshold)
     if table.rise is None:
         return values[:, None], table.threshold.weights
@@ -375,8 +379,8 @@ def _thresholds(table: PosteriorConfig, levels: Sequence[NumericLevels]) -> tupl
 
 
 def _width_problems(table: PosteriorConfig, levels: NumericLevels) -> Iterator[str]:
-    x = np.log(levels) if table.scale == "log" else np.asarray(levels, float)
-    apart, span, name = float(np.diff(x).min()), float(x[-1] - x[0]), table.of[0]
+    x = [log(level) for level in levels] if table.scale == "log" else levels
+    apart, span, name = min(after - before for before, after in pairwise(x)), x[-1] - x[0], table.of[0]
     if table.width.minimum < apart / _MUCH:
         yield (
             f"procedure.width.minimum = {table.width.minimum:g} is less than a {_MUCH}th of the distance of levels of "

@@ -18,7 +18,7 @@ from experiments.design.language import EMPTY, NO, YES, Level, NumberScale, Ques
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.stimuli import stimulus
 from experiments.design.streams import Stream
-from experiments.synthetic.diffusion import Diffusion, decide, person
+from experiments.synthetic.diffusion import Diffusion, person
 from experiments.synthetic.laws import (
     AppealLaw,
     DiffusionLaw,
@@ -100,6 +100,8 @@ class SyntheticParticipant:
         """
         draws = Stream(self._plan.seed, "answer", *self._who, name, str(trial.session), str(trial.trial))
         if name in self._diffusions:
+            from experiments.synthetic.decision import decide  # noqa: PLC0415 - slow, and not for a design's check
+
             decision = decide(self._decision(name, trial.with_chosen(chosen)), draws)
             way = "forward" if decision.upper else "backward"
             return GivenAnswer(value=way, response_time_s=_as_boxed(decision.time_s))

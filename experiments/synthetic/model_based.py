@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from device.words import Direction
 from experiments.config.door import Model, Share
 from experiments.synthetic.diffusion import Diffusion, Lapses, People, Person
-from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence, forward_rates
+from experiments.synthetic.percept import Percept, PerceptParameters, diffusion_of, evidence
 
 NEUTRAL = "neutral"
 """The instruction of a trial that has none."""
@@ -30,6 +30,8 @@ class ModelParameters:
 
 def rates_by_instruction(model: ModelParameters, percept: Percept) -> dict[str, float]:
     """The share of "forward" after a forward shot in the mean over people, by instruction."""
+    from experiments.synthetic.decision import forward_rates  # noqa: PLC0415 - slow, and few designs are asked
+
     log_odds, neutral = evidence(percept, model.percept), model.boundaries[NEUTRAL]
     return {
         name: float(forward_rates(log_odds * boundary / neutral, model.percept.start, model.people, model.lapses.rate))

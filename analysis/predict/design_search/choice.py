@@ -24,8 +24,9 @@ from device.physics import simulate
 from device.physics.equations import HOME
 from device.physics.shot import rates_of_periods_Hz
 from experiments.design.streams import generator
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from device.methods import Method
 from device.words import Direction
-from experiments.synthetic.diffusion import Floats, People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates, percepts_of
+from experiments.synthetic.decision import Floats, forward_rates
+from experiments.synthetic.diffusion import People
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percepts_of
 
 FITTED = ("sensitivity", "confusion", "start")
 ASSUMED = ("exponent", "leak_s", "boundary")

@@ -11,8 +11,9 @@ from analysis.predict.fit.percept_model import Fitted, PerceptFit, PerceptPeak, 
 from analysis.predict.fit.studies import Judgement, PerceptTask
 from device.parameters import GunParameters
 from experiments.record.provenance import provenance
+from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
-from experiments.synthetic.percept import Percept, PerceptParameters, evidence, forward_rates, percept_of, percepts_of
+from experiments.synthetic.percept import Percept, PerceptParameters, evidence, percept_of, percepts_of
 
 FRICTIONS = 41
 """Points of a curve over the friction."""

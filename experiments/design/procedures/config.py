@@ -6,15 +6,16 @@ What a table can tell by itself is checked here; what it must agree on with the 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from math import log
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from experiments.config.door import InnerShare, Model, once
-from experiments.design.language import ColumnName
-from experiments.design.procedures.posterior import credible_span
-from experiments.design.procedures.psychometric import Shape, Shares
+from experiments.design.language import ColumnName, Shape
+
+if TYPE_CHECKING:
+    from experiments.design.procedures.psychometric import Shares
 
 MAX_TRACK = 1_000
 """More trials than this are in no track."""
@@ -136,6 +137,8 @@ class PriorConfig(Model):
     @property
     def values(self) -> Shares:
         """The values."""
+        import numpy as np  # noqa: PLC0415 - slow, and a design without such a procedure needs none of it
+
         if self.spacing == "log":
             return np.geomspace(self.minimum, self.maximum, self.points)
         return np.linspace(self.minimum, self.maximum, self.points)
@@ -143,6 +146,8 @@ class PriorConfig(Model):
     @property
     def weights(self) -> Shares:
         """How likely each value is beforehand, up to a factor: log-normal where the values are spaced so."""
+        import numpy as np  # noqa: PLC0415 - as above
+
         if self.mean is None or self.sd is None:
             return np.ones(self.points)
         off = np.log(self.values / self.mean) if self.spacing == "log" else self.values - self.mean
@@ -172,8 +177,8 @@ def _prior_problems(prior: PriorConfig) -> Iterator[str]:
 
 def _distance(prior: PriorConfig) -> float:
     """How far apart the values stand, of their logarithms where they are spaced so; 0 of one value."""
-    ends = np.log([prior.minimum, prior.maximum]) if prior.spacing == "log" else (prior.minimum, prior.maximum)
-    return float(ends[1] - ends[0]) / max(prior.points - 1, 1)
+    low, high = prior.minimum, prior.maximum
+    return (log(high) - log(low) if prior.spacing == "log" else high - low) / max(prior.points - 1, 1)
 
 
 class PosteriorConfig(NumericTracksConfig):
@@ -203,6 +208,8 @@ class PosteriorConfig(NumericTracksConfig):
 
     def scaled(self, prior: PriorConfig) -> Shares:
         """The values of a level, as the function takes them."""
+        import numpy as np  # noqa: PLC0415 - as above
+
         return prior.values if self.scale == "linear" else np.asarray(np.log(prior.values))
 
 
@@ -223,6 +230,10 @@ def _posterior_problems(table: PosteriorConfig) -> Iterator[str]:
 
 def _credible_width_problems(table: PosteriorConfig) -> Iterator[str]:
     """A width that the prior has already ends a track at once; one that its values cannot show, never."""
+    import numpy as np  # noqa: PLC0415 - as above
+
+    from experiments.design.procedures.posterior import credible_span  # noqa: PLC0415 - as above
+
     asked, values = table.credible_width, table.scaled(table.threshold)
     if asked is None:
         return

@@ -20,7 +20,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.design.procedures.psychometric import Shape, Shares, share_felt
+from experiments.design.language import Shape
+from experiments.design.procedures.psychometric import Shares, share_felt
 
 WantedParameter = Literal["threshold", "width"]
 _ALIKE = 1e-9

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from math import log
 from statistics import NormalDist
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from experiments.design.language import Shape
+
 Shares = NDArray[np.float64]
-Shape = Literal["normal", "logistic", "gumbel", "reversed-gumbel"]
 
 TAIL = 0.05
 """The width goes from this share to its complement."""

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from experiments.design.language import Shape
 from experiments.design.procedures.posterior import AnswerGrid, chance_and_slack, checked_prior
-from experiments.design.procedures.psychometric import Shape, Shares, share_felt
+from experiments.design.procedures.psychometric import Shares, share_felt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+from itertools import pairwise
 
 from experiments.design.procedures.config import KestenConfig, StepAs, UpDownConfig
 from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown
@@ -35,5 +35,5 @@ def are_even(levels: NumericLevels) -> bool:
     >>> are_even((1.0, 1.5, 2.0)), are_even((1.0, 2.0, 4.0))
     (True, False)
     """
-    steps = np.diff(levels)
-    return bool(len(steps)) and bool(steps[0] > 0) and bool(np.all(np.abs(steps - steps[0]) <= _OFF * max(levels)))
+    steps = [after - before for before, after in pairwise(levels)]
+    return bool(steps) and steps[0] > 0 and all(abs(step - steps[0]) <= _OFF * max(levels) for step in steps)
