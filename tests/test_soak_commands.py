@@ -129,7 +129,7 @@ def test_what_a_command_imports(command: Command, runs: dict[str, Path], tmp_pat
     rows = [line.removeprefix("import time:").split("|") for line in done.stderr.splitlines() if "|" in line]
     own_us = [int(row[0]) for row in rows if row[0].strip().isdigit()]
     loaded = {row[2].strip() for row in rows}
-    heavy = ", ".join(name for name in HEAVY if name in loaded)
+    heavy = ", ".join(name for name in HEAVY if name in loaded) or "nothing heavy"
     figure = f"{len(own_us)} modules in {sum(own_us) / 1e6:.2f} s: {heavy}"
     soak(f"what `recoil {' '.join(words[:1])}`{_kind(command)} imports", figure, "stated", "-X importtime")
     assert own_us
