@@ -14,13 +14,23 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass
 from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import Path
 from typing import cast
 
 from device.methods import Method
-from device.plugin.guard import DISARM_S, GuardedGun, PluginError, answer_within, interrupts_held
+from device.plugin.guard import (
+    DISARM_S,
+    GuardedGun,
+    PluginError,
+    answer_of,
+    answer_within,
+    begin_aside,
+    interrupts_held,
+    wait_awake,
+)
 from device.words import Gun, LinkError, error_line, said_by
 
 
@@ -115,12 +125,29 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     """The gun at `NAME:REST`, behind the guard. `ValueError`: no such plug-in; `PluginError`: refused, and why."""
     name, _, rest = address.partition(":")
     make = _loaded(entry_of(name))
+    opened: Future[object] = Future()
     try:
-        gun = answer_within(PLUGIN_OPEN_S, lambda: make(rest, dict(methods), clock))
+        begin_aside(opened, lambda: make(rest, dict(methods), clock), "plug-in")
+        gun = answer_of(opened, PLUGIN_OPEN_S)
+    except KeyboardInterrupt as stop:
+        with interrupts_held():
+            wait_awake(opened, DISARM_S)
+            if not opened.done():
+                why = f"gun plug-in {name} was interrupted while it was being opened"
+                raise PluginError(f"{why}; it may be armed: switch off its power") from stop
+            if opened.exception() is None:
+                _guarded(name, opened.result(), methods, clock).close()
+        raise
     except LinkError as error:
         raise PluginError(f"{address}: {error_line(error) or 'it did not open, and does not say why'}") from error
     except Exception as error:
-        raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}") from error
+        power = "" if opened.done() else "; it may be armed: switch off its power"
+        raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}{power}") from error
+    return _guarded(name, gun, methods, clock)
+
+
+def _guarded(name: str, gun: object, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
+    """What a plug-in opened, behind the guard, if it is a gun that is disarmed."""
     try:
         check_commands(f"gun plug-in {name}", gun, GUN_COMMANDS, "a gun")
     except PluginError as error:

@@ -65,16 +65,24 @@ class PluginSilent(PluginError):  # noqa: N818 - what is so
 
 def answer_within(seconds: float, act: Callable[[], _Answer]) -> _Answer:
     """What an act gives back, or raises. `TimeoutError`: it takes longer; it is then left to itself."""
-    done = begun_aside(act, "plug-in")
+    done: Future[_Answer] = Future()
+    begin_aside(done, act, "plug-in")
+    return answer_of(done, seconds)
+
+
+def answer_of(done: Future[_Answer], seconds: float) -> _Answer:
+    """What an act that has begun gives back, or raises; as `answer_within`."""
     wait_awake(done, seconds)
     if not done.done():
         raise TimeoutError(f"no answer within {seconds:g} s")
     return done.result()
 
 
-def begun_aside(act: Callable[[], _Answer], name: str) -> Future[_Answer]:
-    """What an act gives back or raises, once it does: it has begun in a thread of its own."""
-    done: Future[_Answer] = Future()
+def begin_aside(done: Future[_Answer], act: Callable[[], _Answer], name: str) -> None:
+    """Carry an act out in a thread of its own; `done` is told what it gives back or raises.
+
+    An interrupt may come here when it has begun: who must know of its end holds `done` already.
+    """
 
     def carry_out() -> None:
         try:
@@ -85,7 +93,6 @@ def begun_aside(act: Callable[[], _Answer], name: str) -> Future[_Answer]:
             done.set_exception(RuntimeError(f"it tried to end the program ({said_by(error)})"))
 
     start_aside(carry_out, name)
-    return done
 
 
 def start_aside(act: Callable[[], None], name: str) -> None:

@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,7 +30,7 @@ from device import DeviceError, Gun, open_gun
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
-from device.plugin.guard import PluginError, begun_aside, interrupts_held, wait_awake
+from device.plugin.guard import PluginError, begin_aside, interrupts_held, wait_awake
 from device.serial_gun.gun import SCHEME, speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
@@ -371,8 +372,9 @@ def within_seconds(seconds: float, work: Callable[[], _Result], stop: Callable[[
 
     `stop` is called first where it is given up, also by an interrupt.
     """
-    done = begun_aside(work, "check")
+    done: Future[_Result] = Future()
     try:
+        begin_aside(done, work, "check")
         wait_awake(done, seconds)
     except KeyboardInterrupt:
         with interrupts_held():
