@@ -273,9 +273,7 @@ def test_a_plug_in_that_never_opens_is_refused(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(door, "try_import", lambda _: None)
     monkeypatch.setattr(door, "PLUGIN_OPEN_S", 0.05)
-    with pytest.raises(
-        PluginError, match=r"slow did not open '': TimeoutError: no answer within 0.05 s; it may be"
-    ):
+    with pytest.raises(PluginError, match=r"slow did not open '': TimeoutError: no answer within 0.05 s; it may be"):
         open_gun("slow")
 
 
