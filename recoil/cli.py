@@ -97,7 +97,7 @@ def main() -> None:
     for number in INTERRUPTS:
         signal.signal(number, _interrupt)
     try:
-        _line_of(sys.argv[1:])()
+        _carry_out(sys.argv[1:])
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
     except OSError as error:
@@ -109,6 +109,17 @@ def main() -> None:
     finally:
         _leave_signals()
         gc.freeze()  # what is left goes with the process; looking through it at the end took a sixth of `check`
+
+
+def _carry_out(words: Sequence[str]) -> None:
+    try:
+        _line_of(words)()
+    except (OSError, RecoilError):
+        raise
+    except Exception as error:
+        if _INTERRUPTED_BY:  # which a library made an error of its own of
+            raise KeyboardInterrupt from error
+        raise
 
 
 def _line_of(words: Sequence[str]) -> typer.Typer:
@@ -130,7 +141,11 @@ def _leave_signals() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
+_INTERRUPTED_BY: list[int] = []
+
+
 def _interrupt(number: int, _: object) -> None:
     """Say so here, since the command line's library catches the exception on its way, and ends with 130."""
+    _INTERRUPTED_BY.append(number)
     say("\nrecoil: interrupted; what was acknowledged is on the disk")
     raise KeyboardInterrupt(signal.Signals(number).name)

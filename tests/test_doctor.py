@@ -31,17 +31,15 @@ from experiments.doctor import verdicts
 from experiments.doctor.checks import (
     APPENDS,
     Check,
-    ProgramReply,
     adapters,
     appends,
     carry_out_check,
-    cause,
     checks,
     no_display,
-    run_child,
     ticks,
     within_seconds,
 )
+from experiments.doctor.child import ProgramReply, cause, run_child
 from experiments.doctor.figures import (
     Adapter,
     Appends,

@@ -133,7 +133,6 @@ class OpenedGuns:
 
     def __init__(self, open_gun: Callable[[], Gun]) -> None:
         self._open_gun = open_gun
-        self._lock = threading.Lock()
         self._guns: list[Gun] = []
         self._over = self._opening = False
         self._failed = ""
@@ -145,16 +144,16 @@ class OpenedGuns:
 
     def open(self) -> Gun:
         """The next gun. `LinkError`: it is over."""
-        self._opening = True
+        self._opening = not self._over
         try:
-            gun = self._open_gun()
-            with self._lock:
+            if self._opening:
+                gun = self._open_gun()
+                self._guns.append(gun)  # first: then it is closed here or where it is let go of
                 if not self._over:
-                    self._guns.append(gun)
                     return gun
-            self._close(gun)
+                self._close(gun)
         except DeviceError as error:  # after the end nobody hears of it
-            self._failed = str(error) if self._over else ""
+            self._failed = self._failed or (str(error) if self._over else "")
             raise
         finally:
             self._opening = False
@@ -163,8 +162,7 @@ class OpenedGuns:
     def let_go(self) -> None:
         """Disarm and close what is open; none is opened any more."""
         with interrupts_held():
-            with self._lock:
-                self._over = True
+            self._over = True
             for gun in self._guns:
                 self._close(gun)
 

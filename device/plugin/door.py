@@ -126,9 +126,11 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     name, _, rest = address.partition(":")
     make = _loaded(entry_of(name))
     opened: Future[object] = Future()
+    guarded: GuardedGun | None = None
     try:
-        begin_aside(opened, lambda: make(rest, dict(methods), clock), "plug-in")
-        gun = answer_of(opened, PLUGIN_OPEN_S)
+        gun = _opened(address, opened, lambda: make(rest, dict(methods), clock))
+        with interrupts_held():  # else one could come where nobody knows of the gun
+            guarded = _guarded(name, gun, methods, clock)
     except KeyboardInterrupt as stop:
         with interrupts_held():
             wait_awake(opened, DISARM_S)
@@ -136,14 +138,22 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
                 why = f"gun plug-in {name} was interrupted while it was being opened"
                 raise PluginError(f"{why}; it may be armed: switch off its power") from stop
             if opened.exception() is None:
-                _guarded(name, opened.result(), methods, clock).close()
+                (guarded or _guarded(name, opened.result(), methods, clock)).close()
         raise
+    return guarded
+
+
+def _opened(address: str, opened: Future[object], make: Callable[[], object]) -> object:
+    """What a plug-in makes of its part of the address."""
+    name, _, rest = address.partition(":")
+    try:
+        begin_aside(opened, make, "plug-in")
+        return answer_of(opened, PLUGIN_OPEN_S)
     except LinkError as error:
         raise PluginError(f"{address}: {error_line(error) or 'it did not open, and does not say why'}") from error
     except Exception as error:
         power = "" if opened.done() else "; it may be armed: switch off its power"
         raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}{power}") from error
-    return _guarded(name, gun, methods, clock)
 
 
 def _guarded(name: str, gun: object, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:

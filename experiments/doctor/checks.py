@@ -1,18 +1,14 @@
 """The checks in their order, and what they measure in this process. Each has a deadline; none stops another.
 
-Work that may hang is waited for no longer than its deadline. What could crash runs in a child program, which is asked
-for figures: its crash or silence is an answer.
+Work that may hang is waited for no longer than its deadline. What could crash runs in a child program (`child`).
 """
 
 from __future__ import annotations
 
 import os
 import platform
-import re
 import shutil
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
@@ -22,9 +18,7 @@ from functools import partial
 from importlib import metadata
 from itertools import pairwise
 from pathlib import Path
-from typing import IO, TypeVar
-
-from pydantic import TypeAdapter
+from typing import TypeVar
 
 from device import DeviceError, Gun, open_gun
 from device.parameters import GunParameters
@@ -38,13 +32,13 @@ from experiments.catalogues.messages import NAMED_ANSWERS
 from experiments.clock import RealClock
 from experiments.config.door import ConfigError
 from experiments.doctor import verdicts
+from experiments.doctor.child import ProgramReply, ask
 from experiments.doctor.figures import (
     Adapter,
     Appends,
     DoctorFinding,
     GunLine,
     Machine,
-    ProgramFigures,
     SensorFigures,
     Ticks,
     spread,
@@ -289,7 +283,7 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
 def _tried(address: str, seconds: float, guns: OpenedGuns, work: Callable[[], _Result]) -> _Result:
     """What comes of work with guns, let go of where it is broken off. `PlaceError` names one that is not."""
     try:
-        return within_seconds(seconds, work, guns.let_go)
+        result = within_seconds(seconds, work, guns.let_go)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
     except KeyboardInterrupt:
@@ -298,6 +292,10 @@ def _tried(address: str, seconds: float, guns: OpenedGuns, work: Callable[[], _R
         raise
     except TimeoutError as error:
         raise TimeoutError(f"{error}; {guns.problem or 'it was let go of'}") from error
+    guns.let_go()
+    if guns.problem:  # nothing else that the doctor could say is as urgent
+        raise PlaceError(f"--gun {address}: {guns.problem}")
+    return result
 
 
 def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[DoctorFinding, ...]:
@@ -385,68 +383,3 @@ def within_seconds(seconds: float, work: Callable[[], _Result], stop: Callable[[
         stop()
         raise TimeoutError(f"did not end within {seconds:g} s")
     return done.result()
-
-
-_ROOT = Path(__file__).parents[2]
-"""Where `experiments` lies: started there, the child runs the same code, whatever the caller's folder holds."""
-
-_KILLED_S = 5.0
-
-_TALKATIVE = {"QT_DEBUG_PLUGINS": "1"}
-"""Else Qt blames one system library whichever is missing."""
-
-_MISSING = re.compile(r"\S+\.so[.\d]*: cannot open shared object file")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ProgramReply:
-    """What a child said: figures, or why there are none: it is `absent` here, or an `error` came in between."""
-
-    figures: ProgramFigures | None = None
-    absent: str = ""
-    error: str = ""
-
-
-_REPLY = TypeAdapter(ProgramReply)
-
-
-def ask(program: str, seconds: float) -> ProgramReply:
-    """Run one of the programs beside this module for so long at most."""
-    return run_child([sys.executable, "-m", "experiments.doctor.programs", program], seconds)
-
-
-def run_child(command: list[str], seconds: float) -> ProgramReply:
-    """Run a command that answers with one JSON object; killed after its time, or when this process is interrupted."""
-    with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as errors:
-        child = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=said, stderr=errors, cwd=_ROOT, env=os.environ | _TALKATIVE
-        )
-        try:
-            code = child.wait(seconds)
-        except subprocess.TimeoutExpired:
-            return ProgramReply(error=f"did not end within {seconds:g} s")
-        finally:
-            child.kill()
-            with suppress(subprocess.TimeoutExpired):  # stuck in the system: left behind
-                child.wait(_KILLED_S)
-        return _answer(code, _text(said), _text(errors))
-
-
-def _answer(code: int, said: str, errors: str) -> ProgramReply:
-    if code == 0 and said:
-        return _REPLY.validate_json(said)
-    ending = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-    return ProgramReply(error=f"{ending}: {cause(errors)}")
-
-
-def cause(errors: str) -> str:
-    """What a child that died had to say: the library it missed, else its first line that tells of no search."""
-    missing = _MISSING.search(errors)
-    lines = (line.strip() for line in errors.splitlines())
-    told = (line for line in lines if line and not line.startswith("qt.core."))
-    return missing[0] if missing else next(told, "it said nothing")
-
-
-def _text(file: IO[bytes]) -> str:
-    file.seek(0, os.SEEK_SET)
-    return file.read().decode(errors="replace").strip()
