@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -286,3 +287,25 @@ def test_balanced_orders_take_each_row_of_the_square_in_turn(recoil: Recoil, tmp
         journal = tmp_path / f"results/sub-P{number}/sub-P{number}_task-preference_journal.jsonl"
         rows.append(json.loads(journal.read_text().splitlines()[0])["plan"]["order_row"])
     assert rows == [0, 1, 2, 0, 1, 2]
+
+
+_A_LIBRARY_MAKES_AN_ERROR_OF_AN_INTERRUPT = """
+import signal
+from recoil import cli
+
+def command() -> None:
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt as interrupt:
+        raise ValueError("the library's own") from interrupt
+
+cli._line_of = lambda words: command
+cli.main()
+"""
+
+
+def test_an_error_that_a_library_makes_of_an_interrupt_ends_a_command_as_the_interrupt_does() -> None:
+    command = [sys.executable, "-c", _A_LIBRARY_MAKES_AN_ERROR_OF_AN_INTERRUPT]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (130, "")
+    assert ended.stderr.strip() == "recoil: interrupted; what was acknowledged is on the disk"

@@ -328,6 +328,32 @@ def test_a_kit_that_is_broken_off_lets_go_of_its_gun_at_once_and_opens_no_other(
     assert all("broken off" in one.said for one in found[-3:])
 
 
+class DeadGun(SimulatedGun):
+    """One that cannot be disarmed any more."""
+
+    def close(self) -> None:
+        super().close()
+        raise LinkError("the gun does not answer")
+
+
+def test_a_gun_that_could_not_be_let_go_of_stays_named_and_no_other_is_opened() -> None:
+    made: list[Gun] = []
+
+    def open_one() -> Gun:
+        if made:
+            raise LinkError("the port is gone")
+        made.append(DeadGun(paper_methods(), lambda: 0.0))
+        return made[-1]
+
+    guns = OpenedGuns(open_one)
+    guns.open()
+    guns.let_go()
+    with pytest.raises(LinkError, match="broken off"):
+        guns.open()
+    assert guns.problem == "the gun does not answer: switch off its power"
+    assert len(made) == 1
+
+
 NOTES = """
 import time
 from device.simulated import SimulatedGun
