@@ -356,24 +356,30 @@ def test_a_gun_that_could_not_be_let_go_of_stays_named_and_no_other_is_opened() 
 
 NOTES = """
 import time
+from device import LinkError
 from device.simulated import SimulatedGun
 class Noting(SimulatedGun):
-    deaf = slow = False
+    deaf = slow = stuck = False
     def arm(self): note("arm"); super().arm()
     def fire(self, shot, at_s=None): note("fire"); return super().fire(shot, at_s)
     def disarm(self):
         note("disarm")
         if self.deaf and self.status().shots: time.sleep(60)
         if self.slow: time.sleep(1)
+        if self.stuck and self.status().shots: raise LinkError("the relay sticks")
         super().disarm()
         note("disarmed")
     def close(self): note("close"); super().close()
+class Remote(Noting):
+    def __getattribute__(self, name):
+        if name == "fire": note("looked-up"); time.sleep(1)
+        return super().__getattribute__(name)
 def note(what):
     with open("heard.txt", "a") as file: file.write(what + "\\n")
 def open_gun(address, methods, clock):
-    gun = Noting(methods, clock)
-    gun.deaf, gun.slow = address == "deaf", address == "slow"
-    if gun.slow or address.isdigit(): gun.arm()
+    gun = (Remote if address == "remote" else Noting)(methods, clock)
+    gun.deaf, gun.slow, gun.stuck = address == "deaf", address == "slow", address == "stuck"
+    if gun.slow or address == "remote" or address.isdigit(): gun.arm()
     if address.isdigit(): time.sleep(int(address))
     return gun
 """
@@ -456,6 +462,26 @@ def test_a_gun_whose_opening_is_interrupted_is_disarmed_or_named(
     assert disarmed or named
     assert named or opens_s == 1
     assert "Traceback" not in run.said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [RUN, "doctor"])
+def test_a_gun_that_is_interrupted_between_its_opening_and_its_guard_is_disarmed(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = interrupted(monkeypatch, tmp_path, "remote", command, word="looked-up")
+    assert "disarmed" in ended.heard or "switch off its power" in ended.said
+    assert "Traceback" not in ended.said
+
+
+@pytest.mark.slow
+def test_a_doctor_that_cannot_disarm_its_gun_says_so_whatever_else_it_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    doctor = interrupted(monkeypatch, tmp_path, "stuck", "doctor --fire 5", word="fire", presses=0)
+    assert doctor.code == 2
+    assert "switch off its power" in doctor.said
+    assert "Traceback" not in doctor.said
 
 
 # what the guard believes, and what it lets through
