@@ -52,11 +52,11 @@ def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group
     sds = np.geomspace(float(values[1] - values[0]), 4 * float(values[-1] - values[0]), _SPREADS)
     density = np.exp(-0.5 * ((values - means[:, None, None]) / sds[:, None]) ** 2) / sds[:, None]
     density /= density.sum(axis=-1, keepdims=True)
-    likely = density @ own.T
+    likely = np.einsum("msv,pv->msp", density, own)  # not by BLAS, whose last digit hangs on its threads
     log_weights = np.log(np.maximum(likely, 1e-300)).sum(axis=-1) + np.log(sds / (1 + (sds / scale) ** 2))
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
-    of_people = np.einsum("ms,msv,pv,msp->pv", weights, density, own, 1 / np.maximum(likely, 1e-300), optimize=True)
+    of_people = own * np.einsum("msv,msp->pv", density, weights[..., None] / np.maximum(likely, 1e-300))
     return Group(
         mean=_estimate(means, weights.sum(axis=1), level),
         sd=_estimate(sds, weights.sum(axis=0), level),
