@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as some
+from scipy.optimize import linprog
 from scipy.stats import norm, t
 
 from analysis.psychometric.paired import PairModel, circular_triads, paired_scores
@@ -62,6 +63,28 @@ def test_ties_that_leave_no_best_scores_are_told(model: PairModel, wins: Any, ti
     found = paired_scores(["a", "b"], wins, ties, model=model)
     assert found.reason is not None
     assert "ties" in found.reason
+
+
+def can_grow(wins: np.ndarray, ties: np.ndarray) -> bool:
+    """By linear programming: whether scores and ties can grow for ever so that no answer becomes less likely."""
+    rows = [(i, j, 1.0) for i, j in np.argwhere(wins > 0)] + [(i, j, -1.0) for i, j in np.argwhere(ties > 0)]
+    bounds = np.zeros((len(rows), len(wins)))
+    for bound, (i, j, of) in zip(bounds, rows, strict=True):
+        bound[i], bound[j] = -of, of  # least 1 apart, and at most 1 apart
+    return linprog(np.zeros(len(wins)), bounds, [-of for _, _, of in rows], bounds=(None, None)).status == 0
+
+
+@pytest.mark.parametrize("model", MODELS)
+@given(some.lists(some.integers(0, 2), min_size=9, max_size=9))
+def test_there_are_scores_where_they_and_the_ties_cannot_grow_together(model: PairModel, counts: list[int]) -> None:
+    wins, ties = np.zeros((3, 3)), np.zeros((3, 3))
+    for place, (i, j) in enumerate(combinations(range(3), 2)):
+        wins[i, j], wins[j, i], ties[i, j] = counts[3 * place : 3 * place + 3]
+    ties += ties.T
+    found = paired_scores(range(3), wins, ties, model=model)
+    told = found.reason or ""
+    assume("never" not in told and ties.any())  # of those another rule tells
+    assert ("ties" in told) == can_grow(wins, ties)
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -76,7 +76,8 @@ def paired_scores(
     `ties`) of the shape (people, n, n) the wider of these and score ± t se of a sandwich over people (Liang and Zeger
     1986, times people / (people - 1)), with people - 1 degrees of freedom.
     There are no scores, and a `reason`, where some items were never chosen over the others (Ford 1957): one could be as
-    far above as one likes. `ValueError`: counts that are none, or not of a square of the items.
+    far above as one likes; nor where no circle of items, each chosen over or tied with the next, has more choices than
+    ties: scores and ties could grow together. `ValueError`: counts that are none, or not of a square of the items.
 
     >>> found = paired_scores(["a", "b", "c"], [[0, 7, 9], [3, 0, 6], [1, 4, 0]])
     >>> [(one.item, round(one.score, 3)) for one in found.scores]
@@ -89,7 +90,7 @@ def paired_scores(
     level = share(confidence, "confidence")
     if reason := _not_connected(items, won + tied / 2):
         return PairedScores(model=model, reason=reason)
-    found = _fitted(won, tied, model)
+    found = _fitted(won, tied, model) if _bounded(won, tied) else None
     if found is None:
         reason = "with so many ties scores of any size fit alike; more choices without ties would tell"
         return PairedScores(model=model, reason=reason)
@@ -131,13 +132,11 @@ def circular_triads(items: Sequence[Hashable], wins: ArrayLike) -> Consistency:
 
 
 def _fitted(won: FloatArray, tied: FloatArray, model: PairModel) -> tuple[FloatArray, FloatArray] | None:
-    """The parameters at the maximum and their covariance; `None` where ties lead beyond all bounds."""
+    """The parameters at the maximum and their covariance; `None` where they are beyond what can be told apart."""
 
     def loss(at: FloatArray) -> float:
         return -_log_likelihood(at, won, tied, model)
 
-    if not won.any():
-        return None
     try:
         fit = _maximum(loss, np.zeros(len(won) - 1 + bool(tied.any())))
         covariance = np.asarray(np.linalg.inv(_curvature(loss, fit)), dtype=np.float64)
@@ -216,6 +215,21 @@ def _not_connected(items: Sequence[Hashable], won: FloatArray) -> str:
     if apart > 1:
         return f"never compared with each other: {_named(items, group)}"
     return f"never chosen over the others, or always: {_named(items, part)}; one more choice the other way would do"
+
+
+def _bounded(won: FloatArray, tied: FloatArray) -> bool:
+    """Whether ties leave a maximum, where the items are connected.
+
+    If not, scores d and a reach of 1 can grow together: d_i - d_j ≥ 1 where i was chosen, |d_i - d_j| ≤ 1 where there
+    were ties. Such d exist unless these bounds contradict each other around a circle.
+    """
+    if not tied.any():
+        return True
+    try:
+        scipy.sparse.csgraph.bellman_ford(np.where(won > 0, -1.0, np.where(tied > 0, 1.0, 0.0)))
+    except scipy.sparse.csgraph.NegativeCycleError:
+        return True
+    return False
 
 
 def _named(items: Sequence[Hashable], groups: Iterable[int]) -> str:
