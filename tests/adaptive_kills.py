@@ -61,10 +61,11 @@ def killed_until_done(name: str, folder: Path, draw: random.Random, kills: int) 
     while done < kills:
         more = ["--resume"] if _lines(journal) else ["--fresh"]
         with subprocess.Popen(
-            list(map(str, warm(*_words(name, folder, *more)))), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            list(map(str, warm(*_words(name, folder, *more)))), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         ) as run:
             _wait_until(run, journal, _lines(journal) + draw.randint(1, 60))
             run.kill()
+            run.communicate()  # ends when the program is gone, which the server kills a little later than its client
         contents = begun(journal) if journal.exists() else None
         if contents is not None and contents.finished:
             return done, _rows(name, folder)
