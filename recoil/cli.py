@@ -6,6 +6,8 @@ import gc
 import os
 import signal
 import sys
+import threading
+from _thread import interrupt_main
 from collections.abc import Sequence
 from copy import copy
 from typing import Annotated
@@ -96,6 +98,7 @@ def main() -> None:
     os.umask(0o077)  # what is written here is about people: for its owner alone
     for number in INTERRUPTS:
         signal.signal(number, _interrupt)
+    sys.unraisablehook = _interrupt_again
     try:
         _carry_out(sys.argv[1:])
     except KeyboardInterrupt:
@@ -142,10 +145,24 @@ def _leave_signals() -> None:
 
 
 _INTERRUPTED_BY: list[int] = []
+"""The signals that came, in their order."""
+
+_AGAIN_S = 0.05
 
 
 def _interrupt(number: int, _: object) -> None:
     """Say so here, since the command line's library catches the exception on its way, and ends with 130."""
+    if not _INTERRUPTED_BY:
+        say("\nrecoil: interrupted; what was acknowledged is on the disk")
     _INTERRUPTED_BY.append(number)
-    say("\nrecoil: interrupted; what was acknowledged is on the disk")
     raise KeyboardInterrupt(signal.Signals(number).name)
+
+
+def _interrupt_again(ignored: sys.UnraisableHookArgs) -> None:
+    """Let an interrupt come once more that came where Python ignores errors, as while an object is let go of."""
+    if not isinstance(ignored.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(ignored)
+        return
+    again = threading.Timer(_AGAIN_S, interrupt_main, _INTERRUPTED_BY[-1:])
+    again.daemon = True
+    again.start()

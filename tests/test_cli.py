@@ -15,6 +15,7 @@ from experiments.config.setup import canonical_json
 from experiments.load import shipped_folder
 from experiments.record.journal import link_of
 from tests.conftest import Recoil, refused
+from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 
@@ -308,4 +309,29 @@ def test_an_error_that_a_library_makes_of_an_interrupt_ends_a_command_as_the_int
     command = [sys.executable, "-c", _A_LIBRARY_MAKES_AN_ERROR_OF_AN_INTERRUPT]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout) == (130, "")
+    assert ended.stderr.strip() == "recoil: interrupted; what was acknowledged is on the disk"
+
+
+_AN_INTERRUPT_COMES_WHERE_PYTHON_IGNORES_ERRORS = """
+import signal, time
+from recoil import cli
+
+class Leaving:
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+def command() -> None:
+    Leaving()
+    while True:
+        time.sleep(0.01)
+
+cli._line_of = lambda words: command
+cli.main()
+"""
+
+
+def test_an_interrupt_that_python_ignores_ends_a_command_all_the_same() -> None:
+    command = [sys.executable, "-c", _AN_INTERRUPT_COMES_WHERE_PYTHON_IGNORES_ERRORS]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    assert ended.returncode == 130
     assert ended.stderr.strip() == "recoil: interrupted; what was acknowledged is on the disk"
