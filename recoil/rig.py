@@ -16,7 +16,7 @@ from device.twin.core import IDENTITY
 from device.twin.sockets import Pty, Socket, Tcp
 from device.twin.twin import Make, Troubles, Twin
 from experiments.clock import RealClock
-from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
+from experiments.doctor.checks import GunLeftArmed, LanguageAsked, carry_out_check, checks
 from experiments.doctor.figures import DoctorFinding
 from experiments.doctor.verdicts import overall
 from experiments.load import find, load_gun
@@ -104,11 +104,12 @@ def troubles_of(words: Sequence[str]) -> Troubles:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Examination:
-    """What every check found, when, and the worst verdict."""
+    """What every check found, when, and the worst verdict; `left_armed` says why a gun may be armed still."""
 
     utc: str
     verdict: Literal["good", "warning", "fails"]
     checks: tuple[DoctorFinding, ...]
+    left_armed: str = ""
 
 
 def examine(
@@ -123,7 +124,7 @@ def examine(
 ) -> Examination:
     """Carry out every check; `config` is the gun's, with the limit of its line. With `shots` the gun is fired.
 
-    A participant's language is looked at where it is asked for.
+    A participant's language is looked at where it is asked for. A gun that may be left armed ends it.
 
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
@@ -133,12 +134,17 @@ def examine(
     damped = max(guns, key=lambda one: one.friction_N, default=None)
     limit_s = device.serial.round_trip_limit_s
     planned = checks(results, gun, limit_s, shots=shots, sensor=sensor, damped=damped, asked=asked)
+    left_armed = ""
     with progress("doctor", len(planned)) as tell:
-        for check in planned:
-            findings += carry_out_check(check)
-            tell(check.name)
+        try:
+            for check in planned:
+                findings += carry_out_check(check)
+                tell(check.name)
+        except GunLeftArmed as left:
+            findings += left.found
+            left_armed = str(left)
     verdict = overall([finding.verdict for finding in findings])
-    return Examination(utc=RealClock().utc(), verdict=verdict, checks=tuple(findings))
+    return Examination(utc=RealClock().utc(), verdict=verdict, checks=tuple(findings), left_armed=left_armed)
 
 
 def keep(found: Examination, path: Path) -> None:

@@ -36,6 +36,7 @@ from device.simulated import SimulatedGun
 from device.words import DIRECTIONS
 from experiments import run as runs
 from experiments.clock import RealClock
+from experiments.doctor import checks
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import JournalError, Record, read_journal
@@ -208,6 +209,16 @@ def test_what_a_plug_in_opens_must_be_a_gun(tmp_path, monkeypatch, source, said)
     monkeypatch.setattr(door, "try_import", lambda _: None)
     with pytest.raises(PluginError, match=f"gun plug-in bad:? ?{said}"):
         open_gun("bad:1")
+
+
+@pytest.mark.parametrize("made", ["1 / 0", "exit()", "Gun(disarm=None)"])
+@pytest.mark.parametrize("shots", [0, 5])
+def test_a_doctor_whose_gun_breaks_off_while_it_is_opened_says_that_it_may_be_armed(tmp_path, monkeypatch, made, shots):
+    install(monkeypatch, tmp_path, GUN.format(more="", made=made), name="bad", module="bad_gun")
+    monkeypatch.setattr(door, "try_import", lambda _: None)
+    looks = {one.name: one for one in checks.checks(tmp_path, "bad:1", 0.1, shots=shots)}
+    with pytest.raises(checks.GunLeftArmed, match=r"--gun bad:1: .*switch off its power"):
+        checks.carry_out_check(looks["shots" if shots else "gun"])
 
 
 def test_a_gun_that_lacks_something_is_disarmed_and_closed_as_far_as_it_can_be(tmp_path, monkeypatch):
@@ -387,9 +398,10 @@ def open_gun(address, methods, clock):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
-    """How it ended, what it said, and what the gun heard."""
+    """How it ended, what it wrote on its two streams, and what the gun heard."""
 
     code: int
+    shown: str
     said: str
     heard: list[str]
 
@@ -411,13 +423,13 @@ def interrupted(
     install(patch, folder, NOTES, name="notes", module="noting_gun")
     patch.setenv("PYTHONPATH", str(folder))
     heard, words = folder / "heard.txt", [RECOIL, *command.split(), "--gun", f"notes:{rest}"]
-    with subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
         wait_for(lambda: heard.exists() and heard.read_text().split().count(word) >= times)
         for _ in range(presses):
             program.send_signal(signal.SIGINT)
             time.sleep(0.1)
-        _, said = program.communicate(timeout=PATIENCE_S)
-    return Interrupted(code=program.returncode, said=said, heard=heard.read_text().split())
+        shown, said = program.communicate(timeout=PATIENCE_S)
+    return Interrupted(code=program.returncode, shown=shown, said=said, heard=heard.read_text().split())
 
 
 @pytest.mark.slow
@@ -478,10 +490,27 @@ def test_a_gun_that_is_interrupted_between_its_opening_and_its_guard_is_disarmed
 def test_a_doctor_that_cannot_disarm_its_gun_says_so_whatever_else_it_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    doctor = interrupted(monkeypatch, tmp_path, "stuck", "doctor --fire 5", word="fire", presses=0)
+    words = f"doctor --fire 5 --out {tmp_path / 'found.json'} --json"
+    doctor = interrupted(monkeypatch, tmp_path, "stuck", words, word="fire", presses=0)
     assert doctor.code == 2
+    assert "relay sticks" in doctor.said
     assert "switch off its power" in doctor.said
     assert "Traceback" not in doctor.said
+    found = json.loads(doctor.shown)
+    assert [one["check"] for one in found["checks"]] == ["machine", "clock", "disk", "gun", "shots"]
+    assert found["checks"][-1]["verdict"] == found["verdict"] == "fails"
+    assert found["left_armed"] in doctor.said
+    assert json.loads((tmp_path / "found.json").read_text()) == found
+
+
+def test_a_check_whose_time_is_over_and_whose_gun_cannot_be_disarmed_ends_all_checks(tmp_path, monkeypatch):
+    more = "disarm = lambda self: 1 / 0; status = lambda self: __import__('time').sleep(3)"
+    install(monkeypatch, tmp_path, GUN.format(more=more, made="Gun()"), name="dead", module="dead_gun")
+    monkeypatch.setattr(door, "try_import", lambda _: None)
+    monkeypatch.setattr(checks, "DEADLINE_S", 0.2 - checks.IMPORT_S - checks.PLUGIN_OPEN_S)
+    (gun,) = (one for one in checks.checks(tmp_path, "dead:", 0.1) if one.name == "gun")
+    with pytest.raises(checks.GunLeftArmed, match=r"--gun dead:: did not end within 0.2 s; .*switch off its power"):
+        checks.carry_out_check(gun)
 
 
 # what the guard believes, and what it lets through
@@ -698,7 +727,7 @@ def test_who_closes_a_gun_that_another_is_closing_learns_what_became_of_it(clock
     closing: Future[None] = Future()
     guard.begin_aside(closing, gun.close, "closing")
     begun.wait(PATIENCE_S)
-    with pytest.raises(PluginError, match="gun plug-in liar was not disarmed and closed"):
+    with pytest.raises(PluginError, match=r"gun plug-in liar .*was not disarmed and closed"):
         gun.close()
     assert isinstance(closing.exception(PATIENCE_S), PluginError)
     on.set()

@@ -22,6 +22,7 @@ from device.plugin.guard import (
     CLOCK_SLACK_S,
     LENGTH_SLACK_PART,
     LENGTH_SLACK_S,
+    GunLeftOpen,
     PluginSilent,
     answer_within,
     interrupts_held,
@@ -152,8 +153,9 @@ class OpenedGuns:
                 if not self._over:
                     return gun
                 self._close(gun)
-        except DeviceError as error:  # after the end nobody hears of it
-            self._failed = self._failed or (str(error) if self._over else "")
+        except DeviceError as error:
+            if self._over or isinstance(error, GunLeftOpen):  # after the end nobody else hears of it
+                self._failed = self._failed or str(error)
             raise
         finally:
             self._opening = False

@@ -24,6 +24,7 @@ from device.methods import Method
 from device.plugin.guard import (
     DISARM_S,
     GuardedGun,
+    GunLeftOpen,
     PluginError,
     answer_of,
     answer_within,
@@ -122,7 +123,10 @@ _NAMELESS = "a package without a name"
 
 
 def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
-    """The gun at `NAME:REST`, behind the guard. `ValueError`: no such plug-in; `PluginError`: refused, and why."""
+    """The gun at `NAME:REST`, behind the guard.
+
+    `ValueError`: no such plug-in; `PluginError`: refused, and why; `GunLeftOpen`: refused, and it may be armed.
+    """
     name, _, rest = address.partition(":")
     make = _loaded(entry_of(name))
     opened: Future[object] = Future()
@@ -134,9 +138,9 @@ def open_plugin(address: str, methods: Mapping[str, Method], clock: Callable[[],
     except KeyboardInterrupt as stop:
         with interrupts_held():
             wait_awake(opened, DISARM_S)
-            if not opened.done():
+            if not opened.done() or not isinstance(opened.exception(), LinkError | None):
                 why = f"gun plug-in {name} was interrupted while it was being opened"
-                raise PluginError(f"{why}; it may be armed: switch off its power") from stop
+                raise GunLeftOpen(f"{why}; it may be armed: switch off its power") from stop
             if opened.exception() is None:
                 (guarded or _guarded(name, opened.result(), methods, clock)).close()
         raise
@@ -152,8 +156,8 @@ def _opened(address: str, opened: Future[object], make: Callable[[], object]) ->
     except LinkError as error:
         raise PluginError(f"{address}: {error_line(error) or 'it did not open, and does not say why'}") from error
     except Exception as error:
-        power = "" if opened.done() else "; it may be armed: switch off its power"
-        raise PluginError(f"gun plug-in {name} did not open {rest!r}: {said_by(error)}{power}") from error
+        why = f"gun plug-in {name} did not open {rest!r}: {said_by(error)}"
+        raise GunLeftOpen(f"{why}; it may be armed: switch off its power") from error
 
 
 def _guarded(name: str, gun: object, methods: Mapping[str, Method], clock: Callable[[], float]) -> GuardedGun:
@@ -167,7 +171,7 @@ def _guarded(name: str, gun: object, methods: Mapping[str, Method], clock: Calla
 
 
 def _put_away(gun: object, why: PluginError) -> None:
-    """Disarm and close what lacks something, as far as it can. `PluginError`: it may be armed still."""
+    """Disarm and close what lacks something, as far as it can. `GunLeftOpen`: it may be armed still."""
     failed = False
     with interrupts_held():
         for command in ("disarm", "close"):
@@ -176,7 +180,7 @@ def _put_away(gun: object, why: PluginError) -> None:
             except Exception:  # noqa: BLE001 - a plug-in may do anything
                 failed = True
         if failed:
-            raise PluginError(f"{why}; it could not be disarmed and closed: switch off its power") from why
+            raise GunLeftOpen(f"{why}; it could not be disarmed and closed: switch off its power") from why
 
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:

@@ -59,6 +59,10 @@ class PluginError(LinkError):
     """A plug-in that is refused, that broke off, or says what cannot be."""
 
 
+class GunLeftOpen(PluginError):  # noqa: N818 - what is so
+    """A plug-in's gun that was not disarmed and let go of: it may be armed. Its text says to switch off its power."""
+
+
 class PluginSilent(PluginError):  # noqa: N818 - what is so
     """A plug-in that did not answer in time, and is asked for nothing more but to disarm."""
 
@@ -258,8 +262,11 @@ class GuardedGun:
     def _check_gone(self) -> None:
         """What became of a closing, which may be under way."""
         wait_awake(self._gone, DISARM_S)
-        if not self._gone.done() or self._gone.exception():
-            raise PluginError(f"gun plug-in {self.name} was not disarmed and closed")
+        if not self._gone.done():
+            raise PluginError(f"gun plug-in {self.name} was not disarmed and closed within {DISARM_S:g} s")
+        error = self._gone.exception()
+        if error:
+            raise PluginError(f"{error_line(error) or said_by(error)}; it was not disarmed and closed") from error
 
     # what is asked of the plug-in
 
@@ -288,12 +295,12 @@ class GuardedGun:
             raise
 
     def _refuse(self, why: BaseException) -> None:
-        """Let go of a gun that is not taken. `PluginError`: it may be armed still."""
+        """Let go of a gun that is not taken. `GunLeftOpen`: it may be armed still."""
         try:
             self.close()
         except LinkError as error:
             said = error_line(why) if isinstance(why, LinkError) else f"gun plug-in {self.name}: interrupted"
-            raise PluginError(f"{said}; it was not let go of ({error_line(error)}): switch off its power") from why
+            raise GunLeftOpen(f"{said}; it was not let go of ({error_line(error)}): switch off its power") from why
 
     def _check_disarmed(self, when: str) -> None:
         state = _checked_status(self.name, self._ask("status", self._gun.status), self._clock()).state

@@ -24,7 +24,7 @@ from device import DeviceError, Gun, open_gun
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
-from device.plugin.guard import PluginError, begin_aside, interrupts_held, wait_awake
+from device.plugin.guard import GunLeftOpen, PluginError, begin_aside, interrupts_held, wait_awake
 from device.serial_gun.gun import SCHEME, speed_of
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
@@ -175,6 +175,15 @@ class Check:
     look: Callable[[], tuple[DoctorFinding, ...]]
 
 
+class GunLeftArmed(PlaceError):  # noqa: N818 - what is so
+    """A gun may be armed still: nothing that could be looked at besides is as urgent. `found` is what was till then."""
+
+    def __init__(self, address: str, why: str) -> None:
+        super().__init__(f"--gun {address}: {why}")
+        self.why = why
+        self.found: tuple[DoctorFinding, ...] = (verdicts.of_failure("gun", why),)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LanguageAsked:
     """A participant's language to look at, and where else there are catalogues."""
@@ -218,7 +227,10 @@ def checks(
 
 
 def carry_out_check(check: Check) -> tuple[DoctorFinding, ...]:
-    """What a check found; that it broke off is a finding too. `PlaceError` if it was asked for the impossible."""
+    """What a check found; that it broke off is a finding too.
+
+    `PlaceError` if it was asked for the impossible; `GunLeftArmed` ends all checks.
+    """
     try:
         return check.look()
     except PlaceError:
@@ -277,24 +289,32 @@ def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
         _tried(address, (trials + 20) * SHOT_S + DEADLINE_S, guns, lambda: conformance(rig, found.append))
     except TimeoutError as error:
         found.append(ConformanceFinding(check="time", kept=False, said=str(error)))
+    except GunLeftArmed as left:
+        found.append(ConformanceFinding(check="letting go", kept=False, said=left.why))
+        left.found = (verdicts.of_conformance(found),)
+        raise
     return (verdicts.of_conformance(found),)
 
 
 def _tried(address: str, seconds: float, guns: OpenedGuns, work: Callable[[], _Result]) -> _Result:
-    """What comes of work with guns, let go of where it is broken off. `PlaceError` names one that is not."""
+    """What comes of work with guns, let go of where it is broken off. `GunLeftArmed` names one that is not."""
     try:
         result = within_seconds(seconds, work, guns.let_go)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
+    except GunLeftOpen as error:
+        raise GunLeftArmed(address, str(error)) from error
     except KeyboardInterrupt:
         if guns.problem:
-            raise PlaceError(f"--gun {address}: interrupted; {guns.problem}") from None
+            raise GunLeftArmed(address, f"interrupted; {guns.problem}") from None
         raise
     except TimeoutError as error:
-        raise TimeoutError(f"{error}; {guns.problem or 'it was let go of'}") from error
+        if guns.problem:
+            raise GunLeftArmed(address, f"{error}; {guns.problem}") from error
+        raise TimeoutError(f"{error}; it was let go of") from error
     guns.let_go()
-    if guns.problem:  # nothing else that the doctor could say is as urgent
-        raise PlaceError(f"--gun {address}: {guns.problem}")
+    if guns.problem:
+        raise GunLeftArmed(address, guns.problem)
     return result
 
 

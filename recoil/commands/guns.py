@@ -141,6 +141,7 @@ def doctor(
 ) -> None:
     """The rig's self-test: what was measured, and what to do about what is not good."""
     from experiments.doctor.checks import LanguageAsked
+    from experiments.study.folders import PlaceError
     from recoil import rig as feature
 
     asked = None if language is None else LanguageAsked(code=language, folder=catalogues)
@@ -148,6 +149,8 @@ def doctor(
     show(found, feature.examination_text(found.checks), as_json)
     if out:
         feature.keep(found, out)
+    if found.left_armed:
+        raise PlaceError(found.left_armed)
     raise end(exceptions=found.verdict == "fails")
 
 
