@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -133,6 +134,7 @@ def double(folder: Path) -> None:
 def another(**options: object) -> Callable[[Path], None]:
     def spoil(folder: Path) -> None:
         request = replace(SMALL, **options)  # type: ignore[arg-type]
+        (folder / "3/shard-3-of-3.json").unlink()
         feature.power_shard(request, ShardNumber(number=3, of=3), folder / "3", unseen, workers=1)
 
     return spoil
@@ -226,6 +228,27 @@ def test_a_shard_that_is_there_is_not_worked_out_again(parts: Path) -> None:
 
     again = feature.power_shard(SMALL, ShardNumber(number=1, of=3), parts / "1", never)  # type: ignore[arg-type]
     assert len(again.tallies) == 3
+
+
+def test_a_shard_of_another_job_is_not_written_over(mine: Path) -> None:
+    before, part = files(mine), ShardNumber(number=1, of=3)
+    with pytest.raises(ConfigError, match=r"holds a shard of another job \(seed 1, not 2\)"):
+        feature.power_shard(replace(SMALL, seed=2), part, mine / "1", unseen, workers=1)
+    assert files(mine) == before
+    shutil.copy(mine / "2/shard-2-of-3.json", mine / "1/shard-1-of-3.json")
+    with pytest.raises(ConfigError, match=r"holds a shard of another job \(2/3, not 1/3\)"):
+        feature.power_shard(SMALL, part, mine / "1", unseen, workers=1)
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo], ids=["a folder", "a pipe"])
+def test_what_is_no_file_at_a_shards_place_is_named_before_any_work(
+    make: Callable[[Path], None], tmp_path: Path
+) -> None:
+    make(tmp_path / "shard-1-of-3.json")
+    with pytest.raises(ConfigError, match=r"shard-1-of-3\.json: is no file"):
+        feature.power_shard(SMALL, ShardNumber(number=1, of=3), tmp_path, unseen, workers=1)
+    with pytest.raises(ConfigError, match=r"shard-1-of-3\.json: cannot be used"):
+        feature.merged_power(tmp_path, SMALL, tmp_path / "out")
 
 
 def test_a_shard_for_which_no_work_is_left_says_so(tmp_path: Path) -> None:

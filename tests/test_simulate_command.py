@@ -1,6 +1,7 @@
 """What `recoil simulate` tells beyond a shot's summary."""
 
 import json
+import os
 from dataclasses import fields
 
 import pytest
@@ -77,8 +78,56 @@ def test_what_cannot_be_told_is_refused(recoil, words, said):
 
 def test_the_figure_of_a_shot_names_every_option_also_those_that_are_assumed(tmp_path):
     with figure_files.drawn("svg"):
-        write_plot(GunParameters(drive_off="open", return_friction_N=1.12), tmp_path / "shot.png")
+        write_plot(GunParameters(drive_off="open", return_friction_N=1.12), tmp_path / "shot", "gun, asymmetric-2")
     drawn = (tmp_path / "shot.svg").read_text(encoding="utf-8")
-    for words in ("coil open", "drive_off=open", "emf=printed", "contact_depth_m=0.0005"):
+    for words in (
+        "gun, asymmetric-2",
+        "rigid stop",
+        "coil open",
+        "drive_off=open",
+        "emf=printed",
+        "contact_depth_m=0.0005",
+    ):
         assert words in drawn
     assert all(f"{one.name}=" in drawn for one in fields(GunParameters))
+
+
+def test_a_dot_in_a_figures_name_that_begins_no_ending_stays(recoil, tmp_path):
+    for name in ("run_1.12", "run_1.14.SVG", "plain.pdf"):
+        said = recoil("simulate", "--plot", tmp_path / name).stderr
+        assert f"Figure: {tmp_path}/{name.removesuffix('.SVG').removesuffix('.pdf')}.png" in said
+    drawn = [path for path in tmp_path.glob("*.*") if path.suffix in (".png", ".svg", ".pdf")]
+    assert {path.stem for path in drawn} == {"plain", "run_1.12", "run_1.14"}
+
+
+@pytest.mark.parametrize(("name", "said"), [("", "is a folder"), ("..", "is a folder"), (".png", "no name but")])
+def test_a_figure_needs_a_name(recoil, tmp_path, name, said):
+    done = recoil("simulate", "--plot", f"{tmp_path}/{name}")
+    assert (done.returncode, said in done.stderr) == (2, True)
+    assert list(tmp_path.rglob("*.*")) == []
+
+
+@pytest.mark.parametrize("change", ["voltage_V=1e308", "magnet_mass_kg=1e-300"])
+def test_a_shot_beyond_any_axis_is_not_drawn(recoil, tmp_path, change):
+    done = recoil("simulate", "--set", change, "--plot", tmp_path / "shot.png")
+    assert (done.returncode, "no axis holds" in done.stderr) == (2, True)
+    assert list(tmp_path.rglob("*.*")) == []
+
+
+def test_a_step_too_short_for_a_number_is_traced(recoil, tmp_path):
+    assert recoil("simulate", "--set", "back_emf_V_s_m=1e308", "--trace", tmp_path / "shot.csv").returncode == 0
+
+
+def test_who_asks_for_a_figure_of_another_model_hears_which_it_is(recoil, tmp_path):
+    words = ("simulate", "--fidelity", "no-inductance", "--hand", "assumed", "--trace", tmp_path / "shot.csv")
+    said = recoil(*words).stderr
+    assert "full model, enclosure held still, rigid stop; the no-inductance model, --hand: in the numbers alone" in said
+    assert "in the numbers alone" not in recoil("simulate", "--trace", tmp_path / "shot.csv").stderr
+
+
+def test_a_trace_takes_the_place_of_a_file_alone(recoil, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for name, why in (("", "is a folder; name a file"), ("pipe", "is no regular file")):
+        done = recoil("simulate", "--trace", tmp_path / name)
+        assert (done.returncode, f"{tmp_path / name}: {why}" in done.stderr) == (2, True)
+    assert (tmp_path / "pipe").is_fifo()

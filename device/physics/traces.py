@@ -86,7 +86,7 @@ class Segment:
         """Position, velocity and current at a time of the segment."""
         t = time_s - self.start_s
         if self.series is not None:
-            s = t / self.step_s
+            s = t / self.step_s if self.step_s else 0.0  # a step may be too short for a number
             return value_at(self.series.x, s), value_at(self.series.v, s), value_at(self.series.i, s)
         x, v, i = self.start
         if self.kind != FREE:

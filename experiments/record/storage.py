@@ -186,6 +186,9 @@ def write_whole(path: Path, data: bytes) -> None:
     """Put a whole file in its place at once: readers see the old one or the new one, never a part."""
     part = path.with_name(f".{path.name}.part")
     with errors_name(path):
+        if path.exists() and not path.is_file():
+            why = errno.EISDIR if path.is_dir() else errno.EINVAL
+            raise OSError(why, "is a folder; name a file" if path.is_dir() else "is no regular file; name another")
         part.unlink(missing_ok=True)
         try:
             descriptor = os.open(part, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)
@@ -195,7 +198,8 @@ def write_whole(path: Path, data: bytes) -> None:
             finally:
                 os.close(descriptor)
             part.replace(path)
-        except OSError:
+        except OSError as error:
             part.unlink(missing_ok=True)
+            error.filename, error.filename2 = str(path), None  # nobody knows the other name
             raise
         sync_folder(path.parent)

@@ -117,7 +117,7 @@ def _model_section(rows: list[ModelTime], request: BenchRequest) -> Section:
         rows=tuple(_model_cells(row) for row in rows),
     )
     serving = Table(
-        caption="The cheapest model that each use can bear, with the time of a shot",
+        caption="The model that each use can bear and that is cheapest one shot at a time; another may be in a batch",
         header=("Use", "Bears", "Needs", *(f"Coil {drive_off}" for drive_off in OFF_STATES)),
         rows=tuple(_scene_cells(scene, rows) for scene in SCENES.values()),
     )

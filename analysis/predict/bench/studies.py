@@ -201,7 +201,8 @@ def post_hocs(request: BenchRequest) -> Measured:
             f"{operating.SHIFT:g} standard deviations of a difference, or not at all. Epsilon is Box's, of the "
             "population: 1 is sphericity, 0.5 the least with three conditions. The pooled error claims its level at "
             "sphericity alone; Holm's paired t-tests keep it everywhere; Tukey's test with paired errors stays near "
-            "it. Tukey's test between participants, run on such data, gives most of the power away.",
+            "it. Tukey's test between participants takes what sets people apart for noise: the nearer such data are to "
+            "sphericity, the less it finds.",
         ),
         tables=(table,),
     )

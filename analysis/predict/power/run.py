@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
+from shlex import quote
 
 from pydantic import TypeAdapter
 
@@ -71,10 +72,8 @@ def power_shard(
     """One part of what `power` simulates, as a file in `out`; one that is there already is not worked out again."""
     grid = make_grid(request)
     chunks, job = grid.chunks(), _job(grid)
-    with contextlib.suppress(ConfigError):
-        there = read_shard(out / part.file_name)
-        if there.part == part and not there.job.unlike(job):
-            return there
+    if there := _already(out / part.file_name, part, job):
+        return there
     kept = out / f"unfinished-{job.sha256[:12]}-{part.number}-of-{part.of}.jsonl"
     with _processes(workers, scheduler) as run:
         tallies = _tallies(chunks, part.pieces(chunks), run, kept, progress)
@@ -82,6 +81,19 @@ def power_shard(
     write_shard(out, shard)
     kept.unlink(missing_ok=True)
     return shard
+
+
+def _already(path: Path, part: ShardNumber, job: Job) -> Shard | None:
+    """The shard at its place; none if it is missing or damaged. `ConfigError`: something else is there."""
+    if path.exists() and not path.is_file():
+        raise ConfigError(f"{path}: is no file, so the shard has no place; move it away, or give another --out")
+    try:
+        there = read_shard(path)
+    except ConfigError:
+        return None
+    if differing := there.job.unlike(job) or (there.part != part and f"{there.part}, not {part}"):
+        raise ConfigError(f"{path}: holds a shard of another job ({differing}); give another --out, or delete it")
+    return there
 
 
 def merged_power(folder: Path, request: PowerRequest, out: Path) -> Power:
@@ -115,10 +127,12 @@ def _grid_of(path: Path, shard: Shard, request: PowerRequest) -> Grid:
 def shard_in_short(shard: Shard, out: Path) -> str:
     """What is told of a shard that is done."""
     pieces = (
-        f"{len(shard.tallies)} pieces of work" if shard.tallies else "no work is left for it: fewer shards would do"
+        f"{len(shard.tallies)} piece{'s' * (len(shard.tallies) != 1)} of work"
+        if shard.tallies
+        else "no work is left for it: fewer shards would do"
     )
     file = out / shard.part.file_name
-    return f"Shard {shard.part}: {pieces}\nFile: {file}; when all are there: recoil power --merge {out}"
+    return f"Shard {shard.part}: {pieces}\nFile: {file}; when all are there: recoil power --merge {quote(str(out))}"
 
 
 def _processes(workers: int | None, scheduler: str | None) -> AbstractContextManager[RunPieces]:

@@ -9,15 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.predict.simulate.shot import VIBRATION_POINTS, in_words
+from analysis.predict.simulate.shot import FULL_MODEL, VIBRATION_POINTS, in_words
 from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
 from device.parameters import GunParameters
 from device.physics import ShotSummary, trace
 from device.vibration import Vibration, VibrationParameters, solved
+from experiments.config.door import ConfigError
 
 _COARSE_S = 0.0005  # steps above which a curve is drawn with corners
 _MOST_POINTS = 40_000
 _TITLE_WIDTH = 52
+_LARGEST_DRAWN = 1e100  # beyond it the products of an axis overflow
 
 
 def shot_panel(title: str, parameters: GunParameters) -> ShotPanel:
@@ -47,25 +49,38 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def write_plot(parameters: GunParameters, path: Path) -> None:
-    """Figure 5's panels of the shot by the full model, with all that it was made with; PNG, SVG and PDF."""
+def write_plot(parameters: GunParameters, stem: Path, of: str) -> None:
+    """Figure 5's panels of the shot by the full model, with all that it was made with; PNG, SVG and PDF.
+
+    `of` names gun and method. `ConfigError`: the shot's numbers are too large for any drawing.
+    """
     back_N = parameters.return_friction_N
     friction = f"Friction {parameters.friction_N:g} N{'' if back_N is None else f' ({back_N:g} N on the way back)'}"
     title = f"{friction}, coil {parameters.drive_off} after the pulse"
     panel = shot_panel("\n".join(textwrap.wrap(title, _TITLE_WIDTH)), parameters)
-    figure_5([replace(panel, options=_options(parameters))], path.with_suffix(""))
+    _check_drawable(panel, stem)
+    figure_5([replace(panel, options=f"{of}; {FULL_MODEL}: {_options(parameters)}")], stem)
 
 
-def _options(parameters: GunParameters) -> str:
-    """Every parameter by the name that --set knows it by, also those that are the paper's or assumed."""
+def _check_drawable(panel: ShotPanel, stem: Path) -> None:
+    arrays = (panel.time_s, panel.force_N, panel.displacement_m, panel.velocity_m_s, panel.drive_V)
+    if not all(np.all(np.abs(one) < _LARGEST_DRAWN) for one in arrays):
+        raise ConfigError(
+            f"--plot {stem}: this shot goes beyond {_LARGEST_DRAWN:g}, which no axis holds; leave --plot out"
+        )
+
+
+def _options(parameters: GunParameters | VibrationParameters) -> str:
+    """Every one by the name that --set knows it by, also those that are the paper's or assumed."""
     values = {one.name: getattr(parameters, one.name) for one in fields(parameters)}
     said = [f"{name}={in_words(value)}" for name, value in values.items() if value is not None]
-    return " ".join(("full model:", *said))
+    return " ".join(said)
 
 
-def write_vibration_plot(parameters: VibrationParameters, path: Path) -> None:
-    """The vibration over time, as PNG, SVG and PDF."""
-    figure_vibration(_vibration_panel(parameters, solved(parameters)), path.with_suffix(""))
+def write_vibration_plot(parameters: VibrationParameters, stem: Path, of: str) -> None:
+    """The vibration over time, with all that it was made with, as PNG, SVG and PDF. `of` names gun and method."""
+    panel = _vibration_panel(parameters, solved(parameters))
+    figure_vibration(replace(panel, options=f"{of}; dotted: the envelope. {_options(parameters)}"), stem)
 
 
 def _vibration_panel(parameters: VibrationParameters, vibration: Vibration) -> VibrationPanel:

@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.config.door import ConfigError
+
+FIGURE_ENDINGS = (".png", ".svg", ".pdf")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelRequest:
@@ -37,6 +41,20 @@ class SimulateRequest:
     vary: Sequence[str]
     table: Path | None
     yes: bool
+
+    @property
+    def plot_stem(self) -> Path | None:
+        """Where the figure goes, without its ending: a dot that begins no such ending belongs to the name.
+
+        `ConfigError`: a folder is there, or there is no name.
+        """
+        if self.plot is None:
+            return None
+        if self.plot.is_dir():
+            raise ConfigError(f"--plot {self.plot}: is a folder; name a file")
+        if self.plot.name.lower() in ("", "..", *FIGURE_ENDINGS):
+            raise ConfigError(f"--plot {self.plot}: has no name but its ending; name a file, as in shot.png")
+        return self.plot.with_suffix("") if self.plot.suffix.lower() in FIGURE_ENDINGS else self.plot
 
     @property
     def of_one_shot(self) -> list[str]:

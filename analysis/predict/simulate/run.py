@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from analysis.predict.simulate.request import ModelRequest, SimulateRequest
+from analysis.predict.simulate.request import FIGURE_ENDINGS, ModelRequest, SimulateRequest
 from analysis.predict.simulate.scene import picked, with_contact
 from analysis.predict.simulate.shot import (
+    FULL_MODEL,
     SimulatedShot,
     SimulatedVibration,
     collision_with_stop,
     in_hand,
+    method_of,
     parameters_of,
     simulated_shot,
     simulated_vibration,
@@ -38,16 +41,25 @@ AnySimulated: TypeAlias = "SimulatedShot | SimulatedVibration | Sweep"
 
 def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> AnySimulated:
     """What was asked for; trace, figure and table are written. `ConfigError` for whatever cannot be."""
-    config = load_gun(find(request.gun))
+    stem, config = request.plot_stem, load_gun(find(request.gun))
     rendering = config.rendering(request.method) if request.method in config.methods else None
     if isinstance(rendering, VibrationParameters):
-        return _vibration(request, rendering)
+        found: AnySimulated = _vibration(request, rendering, stem)
+        _tell_files(request, stem, tell)
+        return found
     gun = parameters_of(config, request.method, request.changes)
     if request.vary or request.table:
         from analysis.predict.simulate.sweep import sweep  # noqa: PLC0415 - no shot alone writes tables
 
         return sweep(request, gun, progress, tell)
-    return _shot(request, gun)
+    found = _shot(request, gun)
+    if stem:
+        from analysis.predict.simulate.panels import write_plot  # noqa: PLC0415 - what draws waits for a figure
+
+        write_plot(gun, stem, f"{Path(request.gun).name}, {method_of(config, request.method)}")
+    _tell_files(request, stem, tell)
+    _tell_model(request, found.fidelity, tell)
+    return found
 
 
 def sections(found: AnySimulated) -> tuple[Section, ...]:
@@ -61,17 +73,17 @@ def sections(found: AnySimulated) -> tuple[Section, ...]:
     return table_sections(found)
 
 
-def _vibration(request: SimulateRequest, parameters: VibrationParameters) -> SimulatedVibration:
+def _vibration(request: SimulateRequest, parameters: VibrationParameters, stem: Path | None) -> SimulatedVibration:
     if others := request.of_one_shot + request.of_models:
         raise ConfigError(
             f"{', '.join(others)}: a vibration has an acceleration and no force (its moving mass is not published); "
             "ask for --trace or --plot, or simulate a voice-coil method"
         )
     found = simulated_vibration(parameters, request.trace)
-    if request.plot:
+    if stem:
         from analysis.predict.simulate.panels import write_vibration_plot  # noqa: PLC0415 - as above
 
-        write_vibration_plot(parameters, request.plot)
+        write_vibration_plot(parameters, stem, f"{Path(request.gun).name}, {request.method}")
     return found
 
 
@@ -88,8 +100,23 @@ def _shot(request: SimulateRequest, gun: GunParameters) -> SimulatedShot:
     )
     if request.trace:
         write_trace(gun, request.trace)
-    if request.plot:
-        from analysis.predict.simulate.panels import write_plot  # noqa: PLC0415 - what draws waits for a figure
-
-        write_plot(gun, request.plot)
     return found
+
+
+def _tell_files(request: SimulateRequest, stem: Path | None, tell: Callable[[str], None]) -> None:
+    if request.trace:
+        tell(f"Trace: {request.trace}")
+    if stem:
+        tell("Figure: " + ", ".join(f"{stem}{ending}" for ending in FIGURE_ENDINGS))
+
+
+def _tell_model(request: SimulateRequest, fidelity: str, tell: Callable[[str], None]) -> None:
+    """What was asked for and is in the numbers alone: trace and figure are of the full model of a gun that is held."""
+    given = {
+        f"the {fidelity} model": fidelity != "full",
+        "--hand": request.hand is not None,
+        "--contact-stiffness": request.contact_stiffness_N_m is not None,
+    }
+    if request.of_files and any(given.values()):
+        left = ", ".join(name for name, is_given in given.items() if is_given)
+        tell(f"{' and '.join(request.of_files)}: {FULL_MODEL}; {left}: in the numbers alone")

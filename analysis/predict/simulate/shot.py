@@ -22,6 +22,8 @@ from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.record import storage
 
+FULL_MODEL = "full model, enclosure held still, rigid stop"
+"""What figures and traces of a shot are of."""
 USUAL_HAND = "assumed"
 """The word for the hand of assumed numbers."""
 _BALANCE_WORDS = {
@@ -103,7 +105,7 @@ PARAMETER_KINDS: dict[str, type[float] | type[str]] = {
 
 def parameters_of(gun: GunConfig, method: str | None, changes: Sequence[str]) -> GunParameters:
     """The parameters of a method of a gun, its first one if none is named, with `key=value` changes."""
-    name = method or _first_force_method(gun)
+    name = method_of(gun, method)
     if name not in gun.methods:
         raise ConfigError(f"--method {name}: the gun has {', '.join(gun.methods)}")
     parameters = gun.rendering(name)
@@ -115,7 +117,10 @@ def parameters_of(gun: GunConfig, method: str | None, changes: Sequence[str]) ->
     return _changed(parameters, changes)
 
 
-def _first_force_method(gun: GunConfig) -> str:
+def method_of(gun: GunConfig, method: str | None) -> str:
+    """The method that is asked for, else the gun's first one with a voice coil."""
+    if method is not None:
+        return method
     methods = gun.methods.items()
     return next((name for name, method in methods if method.actuator == "voice-coil"), "asymmetric-1")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.report.figures.style import BLACK, BLUE, GREEN, INK, PURPLE, VERMILION, drawn, light_grid, reference_line
@@ -20,7 +21,7 @@ _PANEL_IN = 4.1
 _SHOWN_PT = 0.8 * 72.0 * _PANEL_IN  # of a panel's width, its axis
 _APART_PT = 17.0  # least distance of two stages' names
 _NAMES_PT = 44.0  # so much room their slanted names take
-_OPTIONS_WIDTH = 86
+_OPTIONS_WIDTH, _VIBRATION_WIDTH = 86, 98  # letters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,12 +75,15 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> None:
             _name_stages(grid[0, column], panel)
             _draw_collision(grid[0, column], panel)
         figure.align_ylabels(grid[:, 0])
-        if len(panels) == 1 and panels[0].options:
-            figure.supxlabel(_in_lines(panels[0].options), x=0.02, ha="left", fontsize=6.5, linespacing=1.4)
+        if len(panels) == 1:
+            _write_options(figure, panels[0].options, _OPTIONS_WIDTH)
 
 
-def _in_lines(options: str) -> str:
-    return "\n".join(textwrap.wrap(options, _OPTIONS_WIDTH, break_long_words=False, break_on_hyphens=False))
+def _write_options(figure: Figure, options: str, width: int) -> None:
+    """What a figure was made with, below it."""
+    lines = textwrap.wrap(options, width, break_long_words=False, break_on_hyphens=False)
+    if lines:
+        figure.supxlabel("\n".join(lines), x=0.02, ha="left", fontsize=6.5, linespacing=1.4, parse_math=False)
 
 
 def _traces(panel: ShotPanel) -> tuple[_Trace, ...]:
@@ -215,6 +219,7 @@ class VibrationPanel:
     peak_m_s2: float
     rms_m_s2: float  # over the duration
     duration_s: float
+    options: str = ""
 
 
 def figure_vibration(panel: VibrationPanel, path_stem: Path) -> None:
@@ -232,7 +237,7 @@ def figure_vibration(panel: VibrationPanel, path_stem: Path) -> None:
         words = f"peak {panel.peak_m_s2:g} m/s²"
         box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}  # over the envelope
         axes.annotate(words, xy=at_peak, xytext=(7.0, 0.0), textcoords="offset points", va="center", bbox=box)
-        reference_line(axes, panel.rms_m_s2, f"RMS\n{panel.rms_m_s2:.5g}")
+        reference_line(axes, panel.rms_m_s2, f"RMS\n{panel.rms_m_s2:.5g}\nm/s²")
         axes.axvline(panel.duration_s * 1e3, color="#777777", linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
         left = float(np.interp(panel.duration_s, panel.time_s, panel.envelope_m_s2)) / panel.peak_m_s2
         axes.annotate(
@@ -250,3 +255,4 @@ def figure_vibration(panel: VibrationPanel, path_stem: Path) -> None:
         axes.set_title(panel.title, loc="left", fontweight="bold")
         axes.set_xlabel("time [ms]")
         axes.set_ylabel("acceleration [m/s²]")
+        _write_options(figure, panel.options, _VIBRATION_WIDTH)
