@@ -129,8 +129,8 @@ def _model_section(rows: list[ModelTime], request: BenchRequest) -> Section:
 
 
 def _model_cells(row: ModelTime) -> tuple[str, ...]:
-    batch = apa.NO_NUMBER if row.batch_us is None else f"{row.batch_us:.3g}"
-    return (row.drive_off, row.fidelity, f"{row.error:.1e}", f"{row.stated:.2g}", f"{row.single_us:.3g}", batch)
+    batch = apa.NO_NUMBER if row.batch_us is None else _three_digits(row.batch_us)
+    return (row.drive_off, row.fidelity, f"{row.error:.1e}", f"{row.stated:.2g}", _three_digits(row.single_us), batch)
 
 
 def _scene_cells(scene: Scene, rows: Sequence[ModelTime]) -> tuple[str, ...]:
@@ -196,9 +196,13 @@ def _front(rows: Sequence[ModelTime], how: str) -> Iterator[ModelTime]:
 
 
 def _us(time_us: float) -> str:
+    return f"{_three_digits(time_us)} us"
+
+
+def _three_digits(number: float) -> str:
     """Three digits, without a power of ten.
 
-    >>> _us(3373.2), _us(0.16923)
-    ('3,370 us', '0.169 us')
+    >>> _three_digits(3373.2), _three_digits(0.16923)
+    ('3,370', '0.169')
     """
-    return f"{float(f'{time_us:.3g}'):,g} us"
+    return f"{float(f'{number:.3g}'):,g}"
