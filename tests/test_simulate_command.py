@@ -127,7 +127,7 @@ def test_who_asks_for_a_figure_of_another_model_hears_which_it_is(recoil, tmp_pa
 
 def test_a_trace_takes_the_place_of_a_file_alone(recoil, tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    for name, why in (("", "is a folder; name a file"), ("pipe", "is no regular file")):
+    for name, why in (("", "is a folder, not a file"), ("pipe", "is a device or a pipe, not a file")):
         done = recoil("simulate", "--trace", tmp_path / name)
         assert (done.returncode, f"{tmp_path / name}: {why}" in done.stderr) == (2, True)
     assert (tmp_path / "pipe").is_fifo()

@@ -182,13 +182,19 @@ def errors_name(path: Path) -> Iterator[None]:
         raise
 
 
+def check_file(path: Path) -> None:
+    """`OSError` if something is at this place that is no file: a folder, a device, or a pipe, which may never end."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "is a folder, not a file", str(path))
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "is a device or a pipe, not a file", str(path))
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Put a whole file in its place at once: readers see the old one or the new one, never a part."""
     part = path.with_name(f".{path.name}.part")
     with errors_name(path):
-        if path.exists() and not path.is_file():
-            why = errno.EISDIR if path.is_dir() else errno.EINVAL
-            raise OSError(why, "is a folder; name a file" if path.is_dir() else "is no regular file; name another")
+        check_file(path)
         part.unlink(missing_ok=True)
         try:
             descriptor = os.open(part, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)

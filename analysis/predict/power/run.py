@@ -84,9 +84,8 @@ def power_shard(
 
 
 def _already(path: Path, part: ShardNumber, job: Job) -> Shard | None:
-    """The shard at its place; none if it is missing or damaged. `ConfigError`: something else is there."""
-    if path.exists() and not path.is_file():
-        raise ConfigError(f"{path}: is no file, so the shard has no place; move it away, or give another --out")
+    """The shard at its place; none if it is missing or damaged. `ConfigError`: another is there; `OSError`: no file."""
+    storage.check_file(path)
     try:
         there = read_shard(path)
     except ConfigError:

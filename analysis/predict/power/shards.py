@@ -117,8 +117,7 @@ def _hash(content: object) -> str:
 def read_shard(path: Path) -> Shard:
     """A shard from its file. `ConfigError` if it is cut, was changed or is none."""
     try:
-        if path.exists() and not path.is_file():
-            raise TypeError  # a pipe would never end
+        storage.check_file(path)
         content = json.loads(path.read_bytes())
         if content["sha256"] == _hash(content["shard"]):
             return _SHARD.validate_python(content["shard"])

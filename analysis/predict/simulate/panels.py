@@ -58,16 +58,14 @@ def write_plot(parameters: GunParameters, stem: Path, of: str) -> None:
     friction = f"Friction {parameters.friction_N:g} N{'' if back_N is None else f' ({back_N:g} N on the way back)'}"
     title = f"{friction}, coil {parameters.drive_off} after the pulse"
     panel = shot_panel("\n".join(textwrap.wrap(title, _TITLE_WIDTH)), parameters)
-    _check_drawable(panel, stem)
+    _check_drawable(panel)
     figure_5([replace(panel, options=f"{of}; {FULL_MODEL}: {_options(parameters)}")], stem)
 
 
-def _check_drawable(panel: ShotPanel, stem: Path) -> None:
+def _check_drawable(panel: ShotPanel) -> None:
     arrays = (panel.time_s, panel.force_N, panel.displacement_m, panel.velocity_m_s, panel.drive_V)
     if not all(np.all(np.abs(one) < _LARGEST_DRAWN) for one in arrays):
-        raise ConfigError(
-            f"--plot {stem}: this shot goes beyond {_LARGEST_DRAWN:g}, which no axis holds; leave --plot out"
-        )
+        raise ConfigError(f"--plot: this shot goes beyond {_LARGEST_DRAWN:g}, which no axis holds; leave --plot out")
 
 
 def _options(parameters: GunParameters | VibrationParameters) -> str:

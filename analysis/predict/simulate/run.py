@@ -42,9 +42,11 @@ AnySimulated: TypeAlias = "SimulatedShot | SimulatedVibration | Sweep"
 def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> AnySimulated:
     """What was asked for; trace, figure and table are written. `ConfigError` for whatever cannot be."""
     stem, config = request.plot_stem, load_gun(find(request.gun))
+    of = f"{Path(request.gun).name}, {method_of(config, request.method)}"
     rendering = config.rendering(request.method) if request.method in config.methods else None
     if isinstance(rendering, VibrationParameters):
-        found: AnySimulated = _vibration(request, rendering, stem)
+        found: AnySimulated = _vibration(request, rendering)
+        _write_vibration(rendering, stem, of)
         _tell_files(request, stem, tell)
         return found
     gun = parameters_of(config, request.method, request.changes)
@@ -53,10 +55,7 @@ def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str]
 
         return sweep(request, gun, progress, tell)
     found = _shot(request, gun)
-    if stem:
-        from analysis.predict.simulate.panels import write_plot  # noqa: PLC0415 - what draws waits for a figure
-
-        write_plot(gun, stem, f"{Path(request.gun).name}, {method_of(config, request.method)}")
+    _write_shot(request, gun, stem, of)
     _tell_files(request, stem, tell)
     _tell_model(request, found.fidelity, tell)
     return found
@@ -73,34 +72,42 @@ def sections(found: AnySimulated) -> tuple[Section, ...]:
     return table_sections(found)
 
 
-def _vibration(request: SimulateRequest, parameters: VibrationParameters, stem: Path | None) -> SimulatedVibration:
+def _vibration(request: SimulateRequest, parameters: VibrationParameters) -> SimulatedVibration:
     if others := request.of_one_shot + request.of_models:
         raise ConfigError(
             f"{', '.join(others)}: a vibration has an acceleration and no force (its moving mass is not published); "
             "ask for --trace or --plot, or simulate a voice-coil method"
         )
-    found = simulated_vibration(parameters, request.trace)
-    if stem:
-        from analysis.predict.simulate.panels import write_vibration_plot  # noqa: PLC0415 - as above
+    return simulated_vibration(parameters, request.trace)
 
-        write_vibration_plot(parameters, stem, f"{Path(request.gun).name}, {request.method}")
-    return found
+
+def _write_vibration(parameters: VibrationParameters, stem: Path | None, of: str) -> None:
+    if stem:
+        from analysis.predict.simulate.panels import write_vibration_plot  # noqa: PLC0415 - what draws waits for it
+
+        write_vibration_plot(parameters, stem, of)
 
 
 def _shot(request: SimulateRequest, gun: GunParameters) -> SimulatedShot:
     fidelity, pick = picked(request.model, gun, {})
     found = simulated_shot(gun, fidelity)
     speed_m_s, stop_N_m = found.summary.impact_speed_m_s, request.contact_stiffness_N_m
-    found = replace(
+    return replace(
         found,
         scene=pick and with_contact(pick, request.model, gun, speed_m_s),
         audit=energy_balance(gun) if request.audit else None,
         hand=None if request.hand is None else in_hand(gun, request.hand),
         contact=None if stop_N_m is None else collision_with_stop(gun, speed_m_s, stop_N_m),
     )
+
+
+def _write_shot(request: SimulateRequest, gun: GunParameters, stem: Path | None, of: str) -> None:
     if request.trace:
         write_trace(gun, request.trace)
-    return found
+    if stem:
+        from analysis.predict.simulate.panels import write_plot  # noqa: PLC0415 - as above
+
+        write_plot(gun, stem, of)
 
 
 def _tell_files(request: SimulateRequest, stem: Path | None, tell: Callable[[str], None]) -> None:
