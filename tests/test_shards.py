@@ -226,8 +226,10 @@ def test_a_shard_that_is_there_is_not_worked_out_again(parts: Path) -> None:
     def never(_: str, __: int) -> None:
         raise AssertionError
 
-    again = feature.power_shard(SMALL, ShardNumber(number=1, of=3), parts / "1", never)  # type: ignore[arg-type]
-    assert len(again.tallies) == 3
+    part = ShardNumber(number=1, of=3)
+    again, was_there = feature.power_shard(SMALL, part, parts / "1", never)  # type: ignore[arg-type]
+    assert (len(again.tallies), was_there) == (3, True)
+    assert "done before and left as it is" in feature.shard_in_short(again, parts / "1", was_there=True)
 
 
 def test_a_shard_of_another_job_is_not_written_over(mine: Path) -> None:
@@ -252,6 +254,8 @@ def test_what_is_no_file_at_a_shards_place_is_named_before_any_work(
 
 
 def test_a_shard_for_which_no_work_is_left_says_so(tmp_path: Path) -> None:
-    empty = feature.power_shard(SMALL, ShardNumber(number=64, of=64), tmp_path, unseen, workers=1)
-    assert "fewer shards would do" in feature.shard_in_short(empty, tmp_path)
+    empty, was_there = feature.power_shard(SMALL, ShardNumber(number=64, of=64), tmp_path, unseen, workers=1)
+    told = feature.shard_in_short(empty, tmp_path, was_there=was_there)
+    assert "fewer shards would do" in told
+    assert "done before" not in told
     assert [path.name for path in tmp_path.iterdir()] == ["shard-64-of-64.json"]

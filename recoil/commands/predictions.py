@@ -101,8 +101,8 @@ def _of_shard(
     from analysis.predict.power import run as feature
 
     number = feature.shard_number(shard)
-    part = feature.power_shard(request, number, out, terminal.progress, workers=workers, scheduler=scheduler)
-    terminal.show(part, feature.shard_in_short(part, out), as_json)
+    part, was_there = feature.power_shard(request, number, out, terminal.progress, workers=workers, scheduler=scheduler)
+    terminal.show(part, feature.shard_in_short(part, out, was_there=was_there), as_json)
 
 
 def _of_studies(

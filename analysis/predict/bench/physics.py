@@ -196,7 +196,7 @@ def _front(rows: Sequence[ModelTime], how: str) -> Iterator[ModelTime]:
 
 
 def _us(time_us: float) -> str:
-    return f"{_three_digits(time_us)} us"
+    return f"{_three_digits(time_us)} µs"
 
 
 def _three_digits(number: float) -> str:

@@ -68,19 +68,19 @@ def power_shard(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-) -> Shard:
-    """One part of what `power` simulates, as a file in `out`; one that is there already is not worked out again."""
+) -> tuple[Shard, bool]:
+    """One part of what `power` simulates, as a file in `out`, and whether it was there: it is not worked out again."""
     grid = make_grid(request)
     chunks, job = grid.chunks(), _job(grid)
     if there := _already(out / part.file_name, part, job):
-        return there
+        return there, True
     kept = out / f"unfinished-{job.sha256[:12]}-{part.number}-of-{part.of}.jsonl"
     with _processes(workers, scheduler) as run:
         tallies = _tallies(chunks, part.pieces(chunks), run, kept, progress)
     shard = Shard(part=part, job=job, tallies=tallies)
     write_shard(out, shard)
     kept.unlink(missing_ok=True)
-    return shard
+    return shard, False
 
 
 def _already(path: Path, part: ShardNumber, job: Job) -> Shard | None:
@@ -123,15 +123,17 @@ def _grid_of(path: Path, shard: Shard, request: PowerRequest) -> Grid:
         ) from error
 
 
-def shard_in_short(shard: Shard, out: Path) -> str:
+def shard_in_short(shard: Shard, out: Path, *, was_there: bool) -> str:
     """What is told of a shard that is done."""
     pieces = (
         f"{len(shard.tallies)} piece{'s' * (len(shard.tallies) != 1)} of work"
         if shard.tallies
         else "no work is left for it: fewer shards would do"
     )
+    done = ", done before and left as it is" if was_there else ""
     file = out / shard.part.file_name
-    return f"Shard {shard.part}: {pieces}\nFile: {file}; when all are there: recoil power --merge {quote(str(out))}"
+    merge = f"when all are there: recoil power --merge {quote(str(out))}"
+    return f"Shard {shard.part}: {pieces}{done}\nFile: {file}; {merge}"
 
 
 def _processes(workers: int | None, scheduler: str | None) -> AbstractContextManager[RunPieces]:
