@@ -125,6 +125,12 @@ def test_who_asks_for_a_figure_of_another_model_hears_which_it_is(recoil, tmp_pa
     assert "in the numbers alone" not in recoil("simulate", "--trace", tmp_path / "shot.csv").stderr
 
 
+@pytest.mark.parametrize("method", ["asymmetric-2", "vibration"])
+def test_a_trace_makes_its_folder_as_a_figure_does(method, recoil, tmp_path):
+    assert recoil("simulate", "--method", method, "--trace", tmp_path / "new" / "shot.csv").returncode == 0
+    assert (tmp_path / "new" / "shot.csv").stat().st_size > 1000
+
+
 def test_a_trace_takes_the_place_of_a_file_alone(recoil, tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for name, why in (("", "is a folder, not a file"), ("pipe", "is a device or a pipe, not a file")):

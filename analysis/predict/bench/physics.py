@@ -196,7 +196,7 @@ def _front(rows: Sequence[ModelTime], how: str) -> Iterator[ModelTime]:
 
 
 def _us(time_us: float) -> str:
-    return f"{_three_digits(time_us)} µs"
+    return f"{_three_digits(time_us)} us"  # not µs: a terminal may have ASCII alone
 
 
 def _three_digits(number: float) -> str:

@@ -130,10 +130,10 @@ def shard_in_short(shard: Shard, out: Path, *, was_there: bool) -> str:
         if shard.tallies
         else "no work is left for it: fewer shards would do"
     )
-    done = ", done before and left as it is" if was_there else ""
+    done = " (done before and left as it is)" if was_there else ""
     file = out / shard.part.file_name
     merge = f"when all are there: recoil power --merge {quote(str(out))}"
-    return f"Shard {shard.part}: {pieces}{done}\nFile: {file}; {merge}"
+    return f"Shard {shard.part}{done}: {pieces}\nFile: {file}; {merge}"
 
 
 def _processes(workers: int | None, scheduler: str | None) -> AbstractContextManager[RunPieces]:

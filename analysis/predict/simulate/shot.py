@@ -204,7 +204,8 @@ def write_trace(parameters: GunParameters, path: Path) -> None:
 
 
 def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
-    """Columns of one length as CSV."""
+    """Columns of one length as CSV; the folder is made if it is missing."""
+    storage.make_folder(path.parent)
     storage.write_whole(path, as_csv(columns, zip(*columns.values(), strict=True)))
 
 
