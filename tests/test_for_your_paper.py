@@ -11,6 +11,7 @@ import pytest
 import analysis.summary.analyze as feature
 from analysis.logs.reading import read_logs
 from analysis.summary.participation import participation
+from analysis.summary.sections import sections
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.experiments import direction_section
 from analysis.summary.sections.manuscript import manuscript_section
@@ -29,7 +30,7 @@ def reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reported:
 
     def run(*paths: Path, **asked: object) -> ReportData:
         found: list[ReportData] = []
-        monkeypatch.setattr(feature, "write_report", lambda _, report, __: found.append(report))
+        monkeypatch.setattr(sections, "write_report", lambda _, report, __: found.append(report))
         feature.analyze(feature.Request(paths=paths, out=tmp_path / "out", **asked))  # type: ignore[arg-type]
         return found[0]
 

@@ -176,6 +176,9 @@ alone = run.SimulateRequest(gun="gun", changes=(), model=model, audit=False, var
 run.simulated(alone, None, None)
 assert not {"scipy.special", "matplotlib", "pandas", "pyarrow", "numba"} & set(sys.modules), "simulate"
 import analysis.summary.analyze
-assert not {"scipy.stats", "scipy.optimize", "numba", "pingouin", "analysis.paper.audit"} & set(sys.modules), "analyze"
+unused = {"scipy.special", "scipy.stats", "numba", "pingouin", "matplotlib", "fontTools", "analysis.paper.audit"}
+assert not unused & set(sys.modules), "verify"
+import analysis.summary.sections.sections
+assert not unused - {"matplotlib", "fontTools"} & set(sys.modules), "analyze"
 """
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -21,7 +21,7 @@ from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
 from analysis.logs.reading import Track
 from analysis.report.serial import as_json
 from analysis.summary.analyze import result_files
-from analysis.summary.sections.sections import STATISTICS
+from analysis.summary.results import STATISTICS_FILE
 from device.words import RecoilError
 from experiments.rebuild import rebuild, shots_path, shots_table
 from experiments.record import journal
@@ -130,16 +130,16 @@ def _is_source(path: str) -> bool:
 def _results(place: Path, settings: ArchiveSettings, theirs: object, track: Track) -> Iterator[_Made]:
     """The statistics with `theirs` as versions, and the tables of results."""
     files = result_files(making.analysis_of(place, settings), track)
-    ours = json.loads(files[STATISTICS])["versions"]
+    ours = json.loads(files[STATISTICS_FILE])["versions"]
     other = theirs != ours
-    as_theirs = as_json(json.loads(files[STATISTICS]) | {"versions": theirs})
-    for path, data in (files | {STATISTICS: as_theirs}).items():
+    as_theirs = as_json(json.loads(files[STATISTICS_FILE]) | {"versions": theirs})
+    for path, data in (files | {STATISTICS_FILE: as_theirs}).items():
         yield _Made(path=f"{ANALYSIS}/{path}", data=data, close=other)
 
 
 def _versions(folder: Path) -> object:
     """The versions that an archive's statistics were made with."""
-    values = _json(folder / ANALYSIS / STATISTICS)
+    values = _json(folder / ANALYSIS / STATISTICS_FILE)
     return values.get("versions") if isinstance(values, dict) else None
 
 

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import xlogy
 
 from analysis.psychometric.grid import NAMES, LevelCounts, Posterior, posterior
 from analysis.psychometric.priors import Priors, default_priors
@@ -343,6 +343,6 @@ def _goodness(counts: LevelCounts, draws: FloatArray) -> Goodness:
 
 def _deviance(right: FloatArray, trials: FloatArray, shares: FloatArray) -> FloatArray:
     """2 Σ ln(likelihood of the data's own shares / of these shares), of the shape (draws,)."""
-    wrong = trials - right
+    wrong, xlogy = trials - right, scipy.special.xlogy
     own = xlogy(right, right / trials) + xlogy(wrong, wrong / trials)
     return np.asarray(2 * (own - xlogy(right, shares) - xlogy(wrong, 1 - shares)).sum(axis=-1))

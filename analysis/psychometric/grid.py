@@ -11,7 +11,7 @@ from functools import cache
 from math import prod
 
 import numpy as np
-from scipy.special import betaln, xlog1py, xlogy
+import scipy
 
 from analysis.psychometric.priors import Priors
 from analysis.stats.arrays import FloatArray
@@ -168,7 +168,7 @@ def _table(right: float, trials: float, spread: float) -> FloatArray:
     share = np.sin(np.linspace(0.0, np.pi / 2, _NODES)) ** 2
     share = np.clip(share, 1e-12, 1 - 1e-12)
     if spread**2 < _NO_SPREAD:
-        return np.asarray(xlogy(right, share) + xlog1py(trials - right, -share))
+        return np.asarray(scipy.special.xlogy(right, share) + scipy.special.xlog1py(trials - right, -share))
     drawn = 1 / spread**2 - 1
     a, b = drawn * share, drawn * (1 - share)
-    return np.asarray(betaln(right + a, trials - right + b) - betaln(a, b))
+    return np.asarray(scipy.special.betaln(right + a, trials - right + b) - scipy.special.betaln(a, b))

@@ -25,10 +25,9 @@ from analysis.summary.languages import unchecked_languages
 from analysis.summary.participation import exclusion_lines, participation
 from analysis.summary.request_data import answers_to, frozen_answer
 from analysis.summary.requests import Requested, Requests
-from analysis.summary.results import RulesApplied, StudyStatistics
+from analysis.summary.results import STATISTICS_FILE, RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
-from analysis.summary.sections.sections import STATISTICS, write_report
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
 from experiments.config.door import ConfigError, load
@@ -104,6 +103,8 @@ def analyze(
 
     `PlaceError` if there is no usable log at all, with every reason.
     """
+    from analysis.summary.sections.sections import write_report  # noqa: PLC0415 - who writes none has no need of figures
+
     files = _loaded(request)
     logs = _usable(request, files, track)
     with progress("analyze", _PARTS) as tell:
@@ -120,7 +121,7 @@ def result_files(request: Request, track: Track = iter) -> dict[str, bytes]:
     """What `analyze` writes beside report and figures, by path: the statistics and the tables. Nothing is written."""
     files = _loaded(request)
     report, parts, _ = _analysis(request, files, _usable(request, files, track))
-    return {STATISTICS: as_json(report.statistics), **_tables(parts)}
+    return {STATISTICS_FILE: as_json(report.statistics), **_tables(parts)}
 
 
 def _loaded(request: Request) -> _Asked:

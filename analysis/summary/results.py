@@ -30,6 +30,8 @@ from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import level_words
 from experiments.record.tables import DataKind
 
+STATISTICS_FILE = "statistics.json"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConfidenceInterval:

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy
@@ -158,10 +159,19 @@ def _wave_slopes(tau: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatAr
 
 _TERMS = 20
 _EVEN = 2 * np.arange(1, _TERMS + 1)
-_COTH = 2.0**_EVEN * scipy.special.bernoulli(2 * _TERMS)[2::2] / np.array([math.factorial(int(n)) for n in _EVEN])
-"""x coth x = 1 + sum of these times x^2, x^4, ...; used for |x| < 1, where 20 terms leave 1e-19 of it."""
-_H_SERIES = ((2.0 - _EVEN) * _COTH)[1:]
-"""x coth x + x^2 / sinh^2 x = 2 C - x C', C = x coth x."""
+
+
+@cache
+def _coth() -> FloatArray:
+    """Of x coth x = 1 + sum of these times x^2, x^4, ...; used for |x| < 1, where 20 terms leave 1e-19 of it."""
+    factorials = np.array([math.factorial(int(n)) for n in _EVEN])
+    return np.asarray(2.0**_EVEN * scipy.special.bernoulli(2 * _TERMS)[2::2] / factorials)
+
+
+@cache
+def _h_series() -> FloatArray:
+    """Of x coth x + x^2 / sinh^2 x = 2 C - x C', C = x coth x."""
+    return ((2.0 - _EVEN) * _coth())[1:]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,7 +230,7 @@ def mean_form(x: FloatArray) -> FloatArray:
     """c(x) = (x coth x - 1) / x^2."""
     small = np.abs(x) < 1.0
     far = np.where(small, 1.0, np.abs(x))
-    return np.where(small, _series(_COTH, x, small), (far / np.tanh(far) - 1.0) / far**2)
+    return np.where(small, _series(_coth(), x, small), (far / np.tanh(far) - 1.0) / far**2)
 
 
 def variance_form(x: FloatArray) -> FloatArray:
@@ -229,7 +239,7 @@ def variance_form(x: FloatArray) -> FloatArray:
     far = np.where(small, 1.0, np.abs(x))
     fall = np.exp(-2.0 * far)
     squared = 4.0 * far**2 * fall / np.expm1(-2.0 * far) ** 2
-    return np.where(small, _series(_H_SERIES, x, small), (far / np.tanh(far) + squared - 2.0) / far**4)
+    return np.where(small, _series(_h_series(), x, small), (far / np.tanh(far) + squared - 2.0) / far**4)
 
 
 def _series(coefficients: FloatArray, x: FloatArray, small: NDArray[np.bool_]) -> FloatArray:

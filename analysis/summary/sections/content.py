@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from analysis.logs.files import Problem
 from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
-from analysis.report.figures.shot import ShotPanel
 from analysis.report.section import Section
 from analysis.summary.delivered import DeliveredCourse
 from analysis.summary.results import StudyStatistics, WithinStatistics
 from experiments.study.study import Member
+
+if TYPE_CHECKING:
+    from analysis.report.figures.shot import ShotPanel
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 

@@ -14,6 +14,7 @@ from analysis.report.page import write_page
 from analysis.report.section import PageHead, PageNotice, Section, Table, names_in_full, shortened
 from analysis.report.serial import as_json
 from analysis.report.terminal import Tell, untold
+from analysis.summary.results import STATISTICS_FILE
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.delivered import delivered_section
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
@@ -34,8 +35,6 @@ from analysis.summary.sections.requested import requested_sections
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_details, trade_sections
 from experiments.record import storage
-
-STATISTICS = "statistics.json"
 
 
 def sections(report: ReportData) -> tuple[Section, ...]:
@@ -145,7 +144,9 @@ def write_report(out: Path, report: ReportData, tell: Tell = untold) -> None:
     """
     storage.make_folder(out)
     methods = [method for one in report.statistics.analysed.values() for method in one.methods]
-    head = PageHead(notices=(*notices(report), *_notices_of_kept_apart(report)), files=(STATISTICS, *report.beside))
+    head = PageHead(
+        notices=(*notices(report), *_notices_of_kept_apart(report)), files=(STATISTICS_FILE, *report.beside)
+    )
     with labelled(report.statistics.labels or {}, methods):
         with process_copies():
             write_figures(out / "figures", report)
@@ -154,5 +155,5 @@ def write_report(out: Path, report: ReportData, tell: Tell = untold) -> None:
         tell("figures")
         parts = sections(report)
         write_page(out, report.title, (*parts, *names_in_full()), head)
-    storage.write_whole(out / STATISTICS, as_json(report.statistics))
+    storage.write_whole(out / STATISTICS_FILE, as_json(report.statistics))
     tell("pages")
