@@ -22,12 +22,18 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import Remark, remark_kind, remark_record
+from experiments.session.remarks import Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Session, Step, step_after, step_record
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
+
+
+HALT_UNSAVED = (
+    "The emergency stop is not on record: free the disk before you close the run. Else it begins without a test shot "
+    "when it is resumed."
+)
 
 
 class RunStopped(RecoilError):  # noqa: N818 - a stop is not an error
@@ -107,6 +113,7 @@ class LiveRun:
         self.inbox: deque[Event] = deque()
         self.news = threading.Condition(threading.RLock())
         self.disarming: list[threading.Thread] = []
+        self.halt_unsaved = False
 
     # for everybody
 
@@ -314,7 +321,9 @@ class LiveRun:
             self._screen.acknowledge(None, remark)
             return
         text = getattr(remark, "text", "")
-        self._screen.trouble(f"{error}. Not saved: “{text}”" if text else str(error))
+        self.halt_unsaved = self.halt_unsaved or isinstance(remark, Halted)
+        lost = HALT_UNSAVED if isinstance(remark, Halted) else f"Not saved: “{text}”" if text else ""
+        self._screen.trouble(f"{error}. {lost}" if lost else str(error))
         if isinstance(error, JournalGone):
             self.offer(events.ResultsGone(cause=str(error)))
 

@@ -44,7 +44,7 @@ from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Noted
-from experiments.session.steps import Answered, Describe, Session, step_record
+from experiments.session.steps import Answered, Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
@@ -223,6 +223,7 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         _refuse_finished(where, contents)
     if contents is not None and not anew:
         if request.again == "ask":
+            os.close(hold_journal(where.journal))  # one that goes on now is not an unfinished one
             raise UnfinishedRun(where, contents)
         return contents
     os.close(hold_journal(where.journal))  # refused while another run is at it
@@ -418,7 +419,7 @@ def _to_the_end(
     except (KeyboardInterrupt, RunStopped) as stop:
         why = str(stop) or "interrupted"
         desk.live.end(why)
-        desk.live.journal.append("stopped", reason=why)
+        _write_stop(desk.live, why)
         saved = _write_table(place, read_journal(place.journal))
         if isinstance(stop, RunStopped):
             stop.saved = saved
@@ -434,6 +435,19 @@ def _to_the_end(
     return _write_table(place, contents)
 
 
+def _write_stop(live: LiveRun, why: str) -> None:
+    """Have on the disk why the run stopped: an emergency stop that was not, is from now on."""
+    try:
+        live.journal.append("stopped", reason=why)
+    except JournalError as error:
+        if live.halt_unsaved:
+            raise JournalError(f"{error}. {HALT_FORGOTTEN}") from error
+        raise
+
+
+HALT_FORGOTTEN = "The emergency stop is not on record: note it; resumed, the run begins without a test shot"
+
+
 def _write_table(place: Place, contents: Contents) -> int:
     """Write the table from the journal as it was read back from the disk; the answers in it."""
     storage.write_whole(place.table, table(contents))
@@ -443,4 +457,4 @@ def _write_table(place: Place, contents: Contents) -> int:
         storage.write_whole(place.shots, measured)
     storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
     told = replay.history(contents)
-    return sum(isinstance(word, Answered) and not isinstance(step, Describe) for step, word in told)
+    return sum(isinstance(word, Answered) for _, word in told)

@@ -322,7 +322,7 @@ class PaperWindow:
         self.troubles.append(text)
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
-        self.gun = GunSeen(status=status, fault=fault)
+        self.gun = GunSeen(status=status, asked_s=0.0, fault=fault)
 
     # the window's side
 

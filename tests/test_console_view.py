@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from device.words import GunState, GunStatus
 from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig
@@ -47,6 +48,10 @@ def prepare(trial: Trial) -> Prepare:
     return Prepare(trial=trial, attempt=2, settings=damper(DIRECTION.gun, trial.method))
 
 
+def status_of(state: GunState) -> GunStatus:
+    return GunStatus(state=state, shots=1, coil_temperature_C=20.0, ready_at_s=0.0)
+
+
 def seen(setup: Setup[DesignConfig], position: Position, *told: Any, **more: Any) -> Seen:
     return Seen(about=About(setup=setup, plan=plan_of(setup)), position=position, told=told, **more)
 
@@ -54,7 +59,7 @@ def seen(setup: Setup[DesignConfig], position: Position, *told: Any, **more: Any
 def shown_texts(here: Seen) -> list[str]:
     shown = view.instruction(replace(here, now_s=10.0))
     texts = [shown.title, shown.damper, shown.detail, view.where_text(here), *progress.coming(here)]
-    return [*texts, *progress.answer_lines(here), *progress.marks(here), progress.gun_text(here.gun)[0]]
+    return [*texts, *progress.answer_lines(here), *progress.marks(here), progress.gun_text(here)[0]]
 
 
 def test_what_comes_next_leaves_out_tracks_that_have_ended() -> None:
@@ -160,10 +165,44 @@ def test_a_scale_whose_ends_are_from_the_right_keeps_its_low_end_on_the_left(mon
 
 def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothing() -> None:
     halted = Position(states=(State.HALTED,))
-    silent = view.instruction(seen(DIRECTION, halted, gun=GunSeen(status=None, fault="no answer")))
-    assert "SWITCH OFF ITS POWER" in silent.damper
+    silent = seen(DIRECTION, halted, gun=GunSeen(status=None, asked_s=1.0, fault="no answer"))
+    assert "does not say that it is disarmed: SWITCH OFF ITS POWER" in view.instruction(silent).damper
     assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted)).damper
-    assert progress.gun_text(GunSeen(status=None, fault="no answer"))[1] == "bad"
+    assert progress.gun_text(silent)[1] == "bad"
+
+
+def test_what_the_gun_said_before_an_emergency_stop_says_nothing_of_what_it_is_after_it() -> None:
+    halted, disarmed = Position(states=(State.HALTED,), since_s=5.0), status_of("disarmed")
+    before = seen(DIRECTION, halted, gun=GunSeen(status=disarmed, asked_s=4.99))
+    assert "Disarming" in view.instruction(before).damper
+    assert "SWITCH OFF ITS POWER" in view.instruction(before).damper
+    after = replace(before, gun=GunSeen(status=disarmed, asked_s=5.0))
+    assert view.instruction(after).damper == "The gun itself says that it is disarmed."
+    armed = replace(before, gun=GunSeen(status=status_of("armed"), asked_s=5.1))
+    assert "does not say that it is disarmed" in view.instruction(armed).damper
+
+
+def test_a_gun_that_has_not_answered_for_a_while_is_not_shown_in_its_last_state() -> None:
+    asked = seen(DIRECTION, Position(), gun=GunSeen(status=status_of("disarmed"), asked_s=1.0))
+    assert progress.gun_text(replace(asked, now_s=1.0 + progress.SILENT_S))[1] == "good"
+    text, mood = progress.gun_text(replace(asked, now_s=5.0))
+    assert (text, mood) == ("Gun: no answer for 4 s", "wait")
+
+
+def test_an_armed_gun_is_not_shown_armed_for_good_after_the_end() -> None:
+    ended = Ended(reason="no space left on device")
+    armed = seen(DIRECTION, Position(), gun=GunSeen(status=status_of("armed"), asked_s=1.0), ended=ended)
+    assert progress.gun_text(armed) == ("Gun: not looked at any more", "wait")
+    disarmed = replace(armed, gun=GunSeen(status=status_of("disarmed"), asked_s=1.0), now_s=60.0)
+    assert progress.gun_text(disarmed)[1] == "good"
+
+
+def test_a_test_shot_is_promised_only_where_the_emergency_stop_is_on_record() -> None:
+    halted = seen(DIRECTION, Position(states=(State.HALTED,)))
+    assert "begins with a test shot" in view.instruction(halted).detail
+    unsaved = view.instruction(replace(halted, halt_unsaved=True)).detail
+    assert "begins with a test shot" not in unsaved
+    assert "not on record" in unsaved
 
 
 def test_rating_and_description_are_awaited_from_the_participants_screen_where_there_is_one() -> None:

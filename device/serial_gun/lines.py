@@ -8,6 +8,7 @@ How long the bytes take, and how unlike they take each way, does not matter: one
 
 from __future__ import annotations
 
+import errno
 import os
 import threading
 from collections import deque
@@ -317,4 +318,6 @@ class SerialPort:
 def _reason(error: Exception) -> str:
     """What went wrong, in the system's words: pyserial's own repeat address and number."""
     number = getattr(error, "errno", None)
+    if number == errno.EAGAIN:
+        return "another program, or another run, has it open: close that first"
     return os.strerror(number) if isinstance(number, int) else str(error)

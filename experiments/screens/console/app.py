@@ -231,10 +231,11 @@ class Console:
     def _look_at(self, gun: Gun) -> None:
         """Look at the gun until the run ends."""
         while not self._over.is_set():
+            asked_s = self.clock.now()
             try:
-                self.gun_seen(gun.status(), "")
+                self._tell(view.GunSeen(status=gun.status(), asked_s=asked_s))
             except DeviceError as error:
-                self.gun_seen(None, str(error))
+                self._tell(view.GunSeen(status=None, asked_s=asked_s, fault=str(error)))
             self._over.wait(GUN_LOOK_S)
 
     # the screen that the run knows
@@ -269,5 +270,5 @@ class Console:
         self._tell(view.Trouble(text=text))
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
-        """Show what the gun itself says."""
-        self._tell(view.GunSeen(status=status, fault=fault))
+        """Show what the gun itself says, now that it was told to disarm."""
+        self._tell(view.GunSeen(status=status, asked_s=self.clock.now(), fault=fault))

@@ -5,7 +5,6 @@ What a press means depends on what is on the screen: a page over it, a line that
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal, Protocol
 
 from experiments.clock import Clock
@@ -20,7 +19,7 @@ from experiments.session.events import Event, Hand, Press
 from experiments.session.history import chosen_levels, entered_value, trial_at
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import flag_word
-from experiments.session.states import EMERGENCY, Position, State
+from experiments.session.states import ARMED, EMERGENCY, Position, State
 from experiments.session.steps import Ask, Rate
 from experiments.tasks.questions import AnswerValue, Choice
 
@@ -97,7 +96,7 @@ class Controls:
         self._live, self._clock, self._view = live, clock, view
         self._choices, self._hand, self._participant = choices, hand, participant
         self._observer = observer
-        self._enter: Callable[[str, Press], bool] | None = None
+        self._open: tuple[keys.Name, Trial] | None = None
         self._held: Press | None = None
         self.drawn = live.position
         self.page: keys.Name | None = None
@@ -114,12 +113,12 @@ class Controls:
     @property
     def typing(self) -> keys.Typing:
         """What is being typed."""
-        return keys.Typing(line=self._enter is not None, field=keys.field_at(self.drawn) is not None)
+        return keys.Typing(line=self._open is not None, field=keys.field_at(self.drawn) is not None)
 
     @property
     def covered(self) -> bool:
         """Whether something that is open takes what is typed: a line, or a page."""
-        return self._enter is not None or self.page is not None
+        return self._open is not None or self.page is not None
 
     @property
     def choices(self) -> tuple[Choice, ...]:
@@ -232,7 +231,7 @@ class Controls:
             return "" if name == "stop" else phrase("The run has ended.")
         if name == "enter":
             return "" if self.typing.letters else keys.why_not(name, self.drawn)
-        if name == "leave" and (self._enter is not None or self.page):
+        if name == "leave" and (self._open is not None or self.page):
             return ""
         if name == "restart":
             return self._no_restart()
@@ -284,8 +283,8 @@ class Controls:
 
     def _entered(self, press: Press) -> None:
         """Enter: the line, the field, or the end of the run."""
-        if self._enter is not None:
-            self._enter_line(press)
+        if self._open is not None:
+            self._enter_line(*self._open, press)
             return
         match keys.field_at(self.drawn):
             case "number":
@@ -331,28 +330,45 @@ class Controls:
         if refused:
             self._view.say(refused, "bad")
         elif name == "stop" and self.drawn.base is State.HALTED:
+            self._set_aside()
             self._offer(events.Stop(reason=EMERGENCY))
-        else:
+        elif self._open is None or self._open[0] != name:
+            self._set_aside()
             moment = self._live.moment
             trial = (moment.repeatable if name == "repeat" else None) or moment.trial
-            self._enter = lambda line, press: self._line(name, trial, line, press)
+            self._open = name, trial
             self._view.open_line(
                 phrase("{question}  (Enter saves, Esc leaves it)", question=_question(name, trial, self._live))
             )
 
     def ask_why_it_stops(self) -> None:
-        """Somebody wants to close the window of a live run."""
+        """Somebody wants to close the window of a live run: a gun that may fire is disarmed first."""
+        if self._live.position.base in ARMED:
+            self._offer(events.Pause())
         self._ask_for("stop")
 
-    def _enter_line(self, press: Press) -> None:
-        text, enter = typed_line(self._view.typed("line")), self._enter
+    def end(self) -> None:
+        """The run is over: what is open or held now is for nothing any more."""
+        self.ended, self._open, self._held = True, None, None
+
+    def _enter_line(self, name: keys.Name, trial: Trial, press: Press) -> None:
+        text = typed_line(self._view.typed("line"))
         if not text:
             self._view.say(phrase("Type a word or two, or leave it with Esc."), "bad")
-        elif enter is not None and enter(text, press):
+        elif self._line(name, trial, text, press):
             self._close_line()
 
+    def _set_aside(self) -> None:
+        """Another command takes the place of an open line: what is typed there is kept as a note."""
+        if self._open is None:
+            return
+        text = typed_line(self._view.typed("line"))
+        if text and self._live.offer(_as_note(*self._open, text)):
+            self._view.say(phrase("What you had typed is kept as a note."), "wait")
+        self._close_line()
+
     def _close_line(self) -> None:
-        self._enter = None
+        self._open = None
         self._view.close_line()
 
     def _line(self, name: keys.Name, trial: Trial, text: str, press: Press) -> bool:
@@ -377,7 +393,7 @@ class Controls:
         """Leave a page, a line or a correction. It never stops anything."""
         if self.page:
             self.uncover()
-        elif self._enter is not None:
+        elif self._open is not None:
             self._close_line()
         elif self.drawn.state is State.CORRECTING:
             self._offer(events.Leave(), press)

@@ -239,7 +239,7 @@ class SidePanel(QtWidgets.QWidget):
     def put(self, seen: Seen, timing: RunTiming) -> None:
         """Show what is so now."""
         for label, (text, mood) in (
-            (self._gun, progress.gun_text(seen.gun)),
+            (self._gun, progress.gun_text(seen)),
             (self._focus, progress.focus_text(seen, here=self.isActiveWindow())),
         ):
             label.setText(text)

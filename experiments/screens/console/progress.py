@@ -10,7 +10,7 @@ from device import GunStatus
 from experiments.design.plan import Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
-from experiments.screens.console.view import About, GunSeen, Seen
+from experiments.screens.console.view import About, Seen
 from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
@@ -141,13 +141,22 @@ def _mark(told: History, word: Outcome | Remark) -> str:
             return ""
 
 
-def gun_text(seen: GunSeen | None) -> tuple[str, str]:
+SILENT_S = 2.0
+"""What a gun said so long ago is not its state any more: it is asked five times a second."""
+
+
+def gun_text(seen: Seen) -> tuple[str, str]:
     """The gun's state in words, and a word that chooses the colour."""
-    if seen is None:
+    said = seen.gun
+    if said is None:
         return phrase("Gun: not seen yet"), "wait"
-    status: GunStatus | None = seen.status
+    status: GunStatus | None = said.status
     if status is None or status.fault:
-        return phrase("Gun: FAULT – {fault}", fault=seen.fault or (status.fault if status else "")), "bad"
+        return phrase("Gun: FAULT – {fault}", fault=said.fault or (status.fault if status else "")), "bad"
+    if seen.ended is not None and status.state != "disarmed":
+        return phrase("Gun: not looked at any more"), "wait"
+    if seen.ended is None and seen.now_s - said.asked_s > SILENT_S:
+        return phrase("Gun: no answer for {silent_s:.0f} s", silent_s=seen.now_s - said.asked_s), "wait"
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
     return phrase(
         "Gun: {state}\n{shots} · coil {coil_temperature_C:.0f} °C",

@@ -13,7 +13,7 @@ from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessage
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
-from experiments.live_run import LiveRun
+from experiments.live_run import HALT_UNSAVED, LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, choices_at, shown_key
 from experiments.screens.phrases import isolated, phrase
@@ -55,9 +55,10 @@ class Saved(Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GunSeen(Message):
-    """The gun as it was a moment ago, or why it does not answer."""
+    """What the gun said of itself, or why it does not answer; `asked_s` is when it was asked."""
 
     status: GunStatus | None
+    asked_s: float
     fault: str = ""
 
 
@@ -125,6 +126,8 @@ class Seen:
     """The adaptive tracks that have ended."""
     letters: bool = False
     """Whether letters are text now."""
+    halt_unsaved: bool = False
+    """Whether an emergency stop could not be written."""
     now_s: float = 0.0
 
     def key(self, name: Name) -> str:
@@ -395,22 +398,25 @@ def _entered_how(entry: Asking) -> str:
 
 
 def _halted(seen: Seen) -> Instruction:
-    status = None if seen.gun is None else seen.gun.status
-    disarmed = status is not None and status.state == "disarmed"
-    does_not = phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
-    return Instruction(
-        title=phrase("EMERGENCY STOP"),
-        damper=phrase("The gun itself says that it is disarmed.") if disarmed else does_not,
-        detail=phrase(
-            (
-                "Nothing fires in this run any more. {reason_key} says why, {stop_key} closes it. "
-                "Resumed, it begins with a test shot."
-            ),
-            reason_key=seen.key("reason"),
-            stop_key=seen.key("stop"),
-        ),
-        mood="bad",
+    closes = phrase(
+        "Nothing fires in this run any more. {reason_key} says why, {stop_key} closes it.",
+        reason_key=seen.key("reason"),
+        stop_key=seen.key("stop"),
     )
+    resumed = HALT_UNSAVED if seen.halt_unsaved else phrase("Resumed, it begins with a test shot.")
+    return Instruction(
+        title=phrase("EMERGENCY STOP"), damper=_since_halt(seen), detail=f"{closes} {resumed}", mood="bad"
+    )
+
+
+def _since_halt(seen: Seen) -> str:
+    """What the gun said since the emergency stop: what it said before says nothing of now."""
+    gun = seen.gun
+    if gun is None or gun.asked_s < seen.position.since_s:
+        return phrase("Disarming. If the gun does not fall silent: SWITCH OFF ITS POWER.")
+    if gun.status is not None and gun.status.state == "disarmed":
+        return phrase("The gun itself says that it is disarmed.")
+    return phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
 
 
 _OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {

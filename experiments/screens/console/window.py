@@ -24,8 +24,7 @@ from experiments.screens.texts import saved_text
 from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
-from experiments.session.remarks import Halted
-from experiments.session.states import Position
+from experiments.session.states import Position, State
 from experiments.session.steps import Failed, Rested
 from experiments.session.tracks import Tracks, adaptive_tracks
 
@@ -149,7 +148,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     def _end(self, message: view.Ended) -> None:
         self.ended = message
         if self.controls is not None:
-            self.controls.ended = True
+            self.controls.end()
         self.close_line()
         self.refresh()  # at once: a window that is closed in this moment has said how it ended
         windows.play_tone()
@@ -161,6 +160,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         before, self.drawn = self.drawn, self.live.position
         if view.typed_there(self.about, before) and not view.typed_there(self.about, self.drawn):
             self.activateWindow()  # the participant's screen took the keys
+        if self.drawn.base is State.HALTED and before.base is not State.HALTED and self._lasting[1] == "good":
+            self._last("", "good")  # what went well before is not to stand below an emergency stop
         if self.controls is not None:
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
@@ -176,7 +177,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:
-            self._last(text, "bad" if isinstance(message.word, Failed | Halted) else "good")
+            self._last(text, "bad" if isinstance(message.word, Failed) else "good")
         if isinstance(message.word, Rested):
             windows.play_tone()
 
@@ -218,6 +219,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             ended=self.ended,
             over=self._tracks_over(told),
             letters=self._typing.letters,
+            halt_unsaved=self.live is not None and self.live.halt_unsaved,
             now_s=self.clock.now(),
         )
 
@@ -374,7 +376,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._restyle()
 
     def closeEvent(self, event: QCloseEvent | None) -> None:  # noqa: N802 - Qt's name
-        """Closing the window of a live run asks why it stops; once it has ended, the window goes."""
+        """Closing the window of a live run pauses it and asks why it stops; once it has ended, the window goes."""
         if event is None:
             return
         if self.ended is None:
