@@ -162,6 +162,24 @@ def test_closing_the_window_asks_why_and_ends_nothing_by_itself(
     assert answers(journal) == ["forward", "backward"]
 
 
+def test_closing_the_window_in_a_train_disarms_before_it_asks_why(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal, watch = tmp_path / f"{PREFERENCE}_journal.jsonl", Watch(str(tmp_path))
+    with AtConsole(run_words(quick_configs, "preference"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.keys.press("F4", "Alt_L")
+        screen.until(lambda look: look.line and look.state == "paused")
+        screen.until(lambda look: look.says("Gun: disarmed"))
+        screen.keys.type("fire alarm\n")
+        code, said = screen.close()
+    assert code == 130, said
+    assert remarks(journal, "paused")
+    assert records(journal)[-1]["reason"] == "fire alarm"
+    check_gun(watch, journal)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_run_and_window_in_order(
     quick_configs: Path, tmp_path: Path, display: str, number: signal.Signals
@@ -208,6 +226,34 @@ def test_a_note_that_is_half_typed_at_the_emergency_stop_is_kept_and_a_reason_ca
     assert (noted["text"], reason["text"]) == ("it got hot", "smoke from the coil")
     assert records(journal)[-1]["reason"] == "emergency stop"
     check_gun(Watch(str(tmp_path)), journal)
+
+
+def test_what_is_half_typed_is_kept_as_a_note_when_another_command_comes_and_q_closes_the_window(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    with AtConsole(run_words(quick_configs), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=1)
+        screen.keys.press("n")
+        screen.until(lambda look: look.line)
+        screen.keys.type("sneezed")
+        screen.keys.press("g", "Control_L")
+        screen.until(lambda look: look.line and look.says("Flag "))
+        screen.keys.type("cough")
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted")
+        screen.keys.press("y", "Control_L")
+        screen.until(lambda look: look.line and look.says("Why was there an emergency stop?"))
+        screen.keys.type("was hurt")
+        screen.keys.press("q", "Control_L")
+        screen.until(lambda look: look.ended)
+        screen.keys.press("q")
+        code, said = screen.end()
+    assert code == 130, said
+    texts = [noted["text"] for noted in remarks(journal, "noted")]
+    assert texts == ["note: sneezed", "flag: cough", "reason: was hurt"]
+    assert records(journal)[-1]["reason"] == "emergency stop"
 
 
 def test_after_an_emergency_stop_a_run_goes_on_only_by_a_held_key_and_a_test_shot(

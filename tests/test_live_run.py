@@ -15,6 +15,7 @@ from device import LimitError, LinkError
 from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, RunStopped
 from experiments.record import storage
+from experiments.record.journal import JournalError
 from experiments.record.replay import history
 from experiments.screens.texts import again_text
 from experiments.session import events
@@ -1064,10 +1065,40 @@ def test_an_emergency_stop_stays_to_be_seen_when_the_results_are_gone(tmp_path: 
         assert sitting.position.why == EMERGENCY
 
 
-def test_a_note_that_cannot_be_written_is_given_back_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
+def full(descriptor: int) -> None:
+    raise OSError(28, "No space left on device")
 
+
+def test_an_emergency_stop_that_cannot_be_written_is_said_and_is_on_record_once_the_disk_is_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        with monkeypatch.context() as disk:
+            disk.setattr(storage, "sync", full)
+            assert sitting.live.offer(events.EmergencyStop())
+            wait_for(lambda: any("not on record" in text for text in sitting.window.troubles), "it is not said")
+        assert sitting.live.halt_unsaved
+        assert sitting.live.offer(events.Stop(reason=EMERGENCY))
+        sitting.settle()
+        assert not remarks(of_journal(sitting), Halted)
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        sitting.to(S.REARMING)
+
+
+def test_a_run_that_ends_with_an_emergency_stop_on_no_record_says_that_it_will_be_forgotten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        monkeypatch.setattr(storage, "sync", full)
+        assert sitting.live.offer(events.EmergencyStop())
+        wait_for(lambda: sitting.live.halt_unsaved, "it is not said")
+        assert sitting.live.offer(events.Stop(reason=EMERGENCY))
+        sitting.settle()
+    assert isinstance(sitting.error, JournalError)
+    assert "The emergency stop is not on record: note it" in str(sitting.error)
+
+
+def test_a_note_that_cannot_be_written_is_given_back_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with sat_at(S.ASKING, tmp_path) as sitting:
         with monkeypatch.context() as disk:
             disk.setattr(storage, "sync", full)

@@ -13,6 +13,7 @@ from experiments import rebuild
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.record import storage
+from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.run import UnfinishedRun, run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
@@ -112,6 +113,16 @@ def test_an_unfinished_run_that_is_asked_about_is_read_once(study: StudyFolder, 
         run(asked(study, "P01"), synthetic_screen, VirtualClock())
     assert len(found.value.contents.records) == 4
     assert (reads[register.REGISTER_FILE], reads[journal.name]) == (1, 1)
+
+
+def test_a_run_that_goes_on_now_is_not_asked_about_as_an_unfinished_one(study: StudyFolder) -> None:
+    journal = study.results / "sub-P01" / JOURNAL.format("P01")
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:4]))
+    with (
+        Journal.reopen(read_journal(journal), VirtualClock()),
+        pytest.raises(JournalError, match="another run holds this journal; close that one first"),
+    ):
+        run(asked(study, "P01"), synthetic_screen, VirtualClock())
 
 
 def test_the_methods_of_a_run_are_rendered_once_when_its_gun_is_loaded(

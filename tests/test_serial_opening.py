@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import pytest
+import serial
 
 from device import LinkError, open_gun
 from device.serial_gun.gun import find_gun, parse
@@ -81,3 +82,12 @@ def test_a_port_that_is_not_there_is_named_once_with_the_systems_reason(tmp_path
     with pytest.raises(LinkError) as refused:
         open_gun(f"serial:{tmp_path}/gun")
     assert str(refused.value) == f"serial:{tmp_path}/gun: cannot open {tmp_path}/gun: No such file or directory"
+
+
+def test_a_port_that_another_program_has_open_is_said_to_be_so():
+    peer, port = os.openpty()
+    with serial.Serial(os.ttyname(port), exclusive=True), pytest.raises(LinkError) as refused:
+        open_gun(f"serial:{os.ttyname(port)}")
+    assert "another program, or another run, has it open: close that first" in str(refused.value)
+    os.close(peer)
+    os.close(port)
