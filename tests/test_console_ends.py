@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,8 @@ from tests.at_display import (
 )
 from tests.at_hand import check_gun
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows
-from tests.watched_console import Watch
+from tests.conftest import RECOIL
+from tests.watched_console import Look, Watch
 
 pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
@@ -226,6 +228,42 @@ def test_a_note_that_is_half_typed_at_the_emergency_stop_is_kept_and_a_reason_ca
     assert (noted["text"], reason["text"]) == ("it got hot", "smoke from the coil")
     assert records(journal)[-1]["reason"] == "emergency stop"
     check_gun(Watch(str(tmp_path)), journal)
+
+
+@contextmanager
+def twin_process() -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The gun's twin as a program: its address, and what can be killed."""
+    with subprocess.Popen([RECOIL, "twin"], stdout=subprocess.PIPE, text=True) as twin:
+        assert twin.stdout is not None
+        try:
+            yield f"serial:{twin.stdout.readline().strip()}", twin
+        finally:
+            twin.kill()
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_gun_that_went_silent_before_the_emergency_stop_is_never_shown_as_disarmed(
+    quick_configs: Path, tmp_path: Path, display: str, number: signal.Signals
+) -> None:
+    def told(look: Look) -> bool:
+        if look.state == "halted":
+            assert look.says("SWITCH OFF ITS POWER")
+            assert not look.says("The gun itself says that it is disarmed.")
+        return look.says("The gun does not say that it is disarmed")
+
+    with (
+        twin_process() as (address, twin),
+        AtConsole(run_words(quick_configs, "direction", "--gun", address), tmp_path, display) as screen,
+    ):
+        screen.stands(RUN)
+        screen.to("asking", trial=1)
+        twin.send_signal(number)
+        screen.keys.press("F12")
+        screen.until(told)
+        screen.keys.press("q")
+        code, said = screen.close()
+    assert code == 130, said
+    assert "stopped: emergency stop" in said
 
 
 def test_what_is_half_typed_is_kept_as_a_note_when_another_command_comes_and_q_closes_the_window(

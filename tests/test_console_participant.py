@@ -154,7 +154,7 @@ def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
         screen.focus_on(RUN)
         screen.until(lambda look: look.active)
         screen.to_the_end()
-        screen.until(lambda look: look.says("Read back from the disk: 2 answers, all that were given."))
+        screen.until(lambda look: look.says("Read back from the disk: 3 answers, all that were given."))
         code, said = screen.close()
     assert code == 130, said
     assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
