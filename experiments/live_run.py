@@ -17,7 +17,7 @@ from device import DeviceError, Gun, GunStatus
 from device.words import RecoilError
 from experiments.clock import Clock
 from experiments.design.plan import Plan
-from experiments.record.journal import Journal, JournalGone
+from experiments.record.journal import Journal, JournalError, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
@@ -246,6 +246,16 @@ class LiveRun:
             stopped = replace(self._position, states=(State.STOPPED,), correcting=None, paused_s=None)
             position = self._position = replace(stopped, serial=stopped.serial + 1, why=why)
         self._screen.show(position)
+
+    def write_stop(self, why: str) -> None:
+        """Have on the disk why the run stopped; an emergency stop that was not on record is so from then on."""
+        try:
+            self.journal.append("stopped", reason=why)
+        except JournalError as error:
+            if not self.halt_unsaved:
+                raise
+            forgotten = "The emergency stop is not on record: note it; resumed, the run begins without a test shot"
+            raise JournalError(f"{error}. {forgotten}") from error
 
     def allow_shot(self) -> None:
         """Nothing if a shot may be fired now. `RunStopped`, `Held`: it may not."""

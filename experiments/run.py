@@ -419,7 +419,7 @@ def _to_the_end(
     except (KeyboardInterrupt, RunStopped) as stop:
         why = str(stop) or "interrupted"
         desk.live.end(why)
-        _write_stop(desk.live, why)
+        desk.live.write_stop(why)
         saved = _write_table(place, read_journal(place.journal))
         if isinstance(stop, RunStopped):
             stop.saved = saved
@@ -433,19 +433,6 @@ def _to_the_end(
     hashes = {"table_sha256": hashlib.sha256(table(contents)).hexdigest(), "journal_sha256": contents.sha256}
     desk.live.journal.append("finished", **hashes)
     return _write_table(place, contents)
-
-
-def _write_stop(live: LiveRun, why: str) -> None:
-    """Have on the disk why the run stopped: an emergency stop that was not, is from now on."""
-    try:
-        live.journal.append("stopped", reason=why)
-    except JournalError as error:
-        if live.halt_unsaved:
-            raise JournalError(f"{error}. {HALT_FORGOTTEN}") from error
-        raise
-
-
-HALT_FORGOTTEN = "The emergency stop is not on record: note it; resumed, the run begins without a test shot"
 
 
 def _write_table(place: Place, contents: Contents) -> int:

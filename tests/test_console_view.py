@@ -184,7 +184,7 @@ def test_what_the_gun_said_before_an_emergency_stop_says_nothing_of_what_it_is_a
 
 def test_a_gun_that_has_not_answered_for_a_while_is_not_shown_in_its_last_state() -> None:
     asked = seen(DIRECTION, Position(), gun=GunSeen(status=status_of("disarmed"), asked_s=1.0))
-    assert progress.gun_text(replace(asked, now_s=1.0 + progress.SILENT_S))[1] == "good"
+    assert progress.gun_text(replace(asked, now_s=1.0 + progress.UNANSWERED_S))[1] == "good"
     text, mood = progress.gun_text(replace(asked, now_s=5.0))
     assert (text, mood) == ("Gun: no answer for 4 s", "wait")
 

@@ -12,13 +12,13 @@ from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
 from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import FLAG_RULE, short_place, typed_line, typed_number
+from experiments.screens.texts import FLAG_RULE, typed_line, typed_number
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
-from experiments.session.history import chosen_levels, entered_value, trial_at
+from experiments.session.history import chosen_levels, entered_value
 from experiments.session.judging import REARM_HELD_S
-from experiments.session.remarks import flag_word
 from experiments.session.states import ARMED, EMERGENCY, Position, State
 from experiments.session.steps import Ask, Rate
 from experiments.tasks.questions import AnswerValue, Choice
@@ -204,7 +204,7 @@ class Controls:
 
     def _run(self, name: keys.Name, press: Press) -> None:
         self.uncover()
-        if name in _QUESTIONS:
+        if name in LINE_QUESTIONS:
             self._ask_for(name)
         elif name in keys.ANSWERS:
             self._choose(keys.ANSWERS.index(name), press)
@@ -338,7 +338,7 @@ class Controls:
             trial = (moment.repeatable if name == "repeat" else None) or moment.trial
             self._open = name, trial
             self._view.open_line(
-                phrase("{question}  (Enter saves, Esc leaves it)", question=_question(name, trial, self._live))
+                phrase("{question}  (Enter saves, Esc leaves it)", question=line_question(name, trial, self._live))
             )
 
     def ask_why_it_stops(self) -> None:
@@ -363,7 +363,7 @@ class Controls:
         if self._open is None:
             return
         text = typed_line(self._view.typed("line"))
-        if text and self._live.offer(_as_note(*self._open, text)):
+        if text and self._live.offer(line_as_note(*self._open, text)):
             self._view.say(phrase("What you had typed is kept as a note."), "wait")
         self._close_line()
 
@@ -373,7 +373,7 @@ class Controls:
 
     def _line(self, name: keys.Name, trial: Trial, text: str, press: Press) -> bool:
         """Do what a line was typed for; what comes too late is kept as a note. Whether the line is done with."""
-        event = _event_of(name, trial, text)
+        event = line_event(name, trial, text)
         if event is None:
             self._view.say(FLAG_RULE, "bad")
             return False
@@ -381,7 +381,7 @@ class Controls:
         if verdict.taken:
             self._say(verdict)
             return True
-        kept = self._live.offer(_as_note(name, trial, text))
+        kept = self._live.offer(line_as_note(name, trial, text))
         self._view.say(
             phrase("{text} What you typed is kept as a note.", text=verdict.text) if kept else verdict.text, "wait"
         )
@@ -428,43 +428,3 @@ class Controls:
             does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].told)
         not_done = phrase("   – not now: {because}", because=not_now) if not_now else ""
         return f"{key:<8} {does}{not_done}"
-
-
-# the lines that are typed for a command: what is asked, and which event comes of it
-
-_QUESTIONS: dict[keys.Name, str] = {
-    "end break": phrase("Why does the break end early?"),
-    "repeat": phrase("Why is trial {trial} to be presented again?"),
-    "flag": phrase("Flag {place} as (a word such as noise or late)"),
-    "note": phrase("Note on {place}"),
-    "reason": phrase("Why was there an emergency stop?"),
-    "stop": phrase("Why does the run stop here? It can be resumed."),
-}
-
-
-def _question(name: keys.Name, trial: Trial, live: LiveRun) -> str:
-    place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
-    return _QUESTIONS[name].format(trial=trial.trial, place=place)
-
-
-def _event_of(name: keys.Name, trial: Trial, text: str) -> Event | None:
-    """What a typed text comes to; `None` if it is to be a flag and is none."""
-    match name:
-        case "end break":
-            return events.EndBreak(reason=text)
-        case "repeat":
-            return events.Repeat(reason=text, trial=trial)
-        case "flag":
-            flag = flag_word(text)
-            return None if flag is None else events.Flag(flag=flag, trial=trial)
-        case "note":
-            return events.Note(text=text, trial=trial)
-        case "reason":
-            return events.Reason(text=text)
-        case _:
-            return events.Stop(reason=text)
-
-
-def _as_note(name: keys.Name, trial: Trial, text: str) -> events.Note:
-    """What was typed for something that is not done any more."""
-    return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)

@@ -141,7 +141,7 @@ def _mark(told: History, word: Outcome | Remark) -> str:
             return ""
 
 
-SILENT_S = 2.0
+UNANSWERED_S = 2.0
 """What a gun said so long ago is not its state any more: it is asked five times a second."""
 
 
@@ -155,7 +155,7 @@ def gun_text(seen: Seen) -> tuple[str, str]:
         return phrase("Gun: FAULT – {fault}", fault=said.fault or (status.fault if status else "")), "bad"
     if seen.ended is not None and status.state != "disarmed":
         return phrase("Gun: not looked at any more"), "wait"
-    if seen.ended is None and seen.now_s - said.asked_s > SILENT_S:
+    if seen.ended is None and seen.now_s - said.asked_s > UNANSWERED_S:
         return phrase("Gun: no answer for {silent_s:.0f} s", silent_s=seen.now_s - said.asked_s), "wait"
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
     return phrase(
