@@ -453,3 +453,32 @@ def test_the_commands(recoil: Recoil, made: tuple[Path, Path, Archived], tmp_pat
     assert done.returncode == 1, done
     assert "recoil: README.md: missing" in done.stderr
     refused(recoil("verify", "study"), "is no archive of Recoil")
+
+
+def test_what_came_to_the_place_of_an_archive_meanwhile_stays_there(tmp_path: Path) -> None:
+    target = tmp_path / "archive"
+
+    def check() -> None:
+        if not placing.is_free(target):
+            raise PlaceError("is there already")
+
+    def fill() -> None:
+        with placing.in_place(target, check) as part:
+            placing.write_file(part, "README.md", b"ours")
+            placing.write_file(target, "thesis.txt", b"theirs")
+
+    with pytest.raises(PlaceError, match="is there already"):
+        fill()
+    assert [path.name for path in tmp_path.rglob("*")] == ["archive", "thesis.txt"]
+
+
+def test_an_export_keeps_the_unfinished_folder_of_another_that_is_at_work(tmp_path: Path) -> None:
+    one, left_over = tmp_path / "one", tmp_path / ".one.part-killed"
+    left_over.mkdir()
+    with placing.in_place(one, list) as first:
+        placing.write_file(first, "first", b"")
+        with placing.in_place(one, list) as second:
+            placing.write_file(second, "second", b"")
+            assert (first / "first").exists()
+        assert not left_over.exists()
+    assert [path.name for path in one.iterdir()] == ["first"]

@@ -202,6 +202,22 @@ def test_people_who_say_the_same_to_everything_are_named_and_kept(careless: Repo
     assert "said backward" not in told
 
 
+@pytest.mark.parametrize("codes", [("P02",), ("P01", "P02", "P03")])
+def test_people_without_backward_trials_are_reported_with_what_they_have(
+    tmp_path: Path, reported: Reported, codes: tuple[str, ...]
+) -> None:
+    for code, seed in (("P01", 1), ("P02", 2), ("P03", 3)):
+        rows = trial_rows(code, seed)
+        for row in rows:
+            felt = "forward" if code in codes else row["direction"]
+            row.update(direction=felt, response="forward", correct=str(int(felt == "forward")))
+        write_rows(trials_path(tmp_path / "results", code), rows)
+    (section,) = quality_section(reported(tmp_path / "results"))
+    named = [code for code in ("P01", "P02", "P03") if code not in codes]
+    told = "\n".join(section.items)
+    assert (f"said forward in every trial (kept): {', '.join(named)}." in told) is bool(named)
+
+
 def test_numbers_of_trials_that_differ_are_said_as_they_are(careless: ReportData) -> None:
     said = quotes(careless)
     assert "the direction of shots with each of 3 rendering methods" in said

@@ -378,3 +378,8 @@ def test_the_guard_is_on_what_programs_read_as_formulas_alone() -> None:
         *("'=1", "'@x", "'-3", "'+4", "''a"),
         *("plain", "1=2"),
     ]
+
+
+def test_a_closed_standard_output_is_no_error() -> None:
+    done = subprocess.run(f"{RECOIL} simulate >&-", shell=True, capture_output=True, text=True, check=False)  # noqa: S602
+    assert (done.returncode, done.stderr) == (0, "")

@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -157,12 +158,15 @@ def test_an_interrupted_job_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_interrupted_job_on_processes_ends_and_leaves_none(tmp_path: Path) -> None:
+@pytest.mark.parametrize("presses", [1, 3])
+def test_an_interrupted_job_on_processes_ends_and_leaves_none(tmp_path: Path, presses: int) -> None:
     words = [RECOIL, "power", "direction", "--participants", "14", "--effect", "1", "--studies", "400000"]
     words += ["--workers", "2", "--out", tmp_path / "out"]
     with subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True) as running:
         wait_for(lambda: list((tmp_path / "out").glob("unfinished*")))
-        os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to everybody
+        for _ in range(presses):
+            os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to everybody
+            time.sleep(0.1)
         _, errors = running.communicate(timeout=PATIENCE_S)
     assert running.returncode == 130, errors
     assert b"Traceback" not in errors

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -110,7 +111,7 @@ def export_archive(request: ArchiveRequest, track: Track = iter, progress: Progr
     settings = ArchiveSettings(title=title, free_text=request.free_text, include_synthetic=request.include_synthetic)
     given = _citation([request.folder, results, results.parent])
     entries = [*_entries(runs), *contents.left_out_entries(logs, members, unproven)]
-    with placing.in_place(target) as part:
+    with placing.in_place(target, lambda: _free_target(request)) as part:
         _write_results(part, runs, members, free_text=request.free_text)
         _write_analysis(part, request, settings, pages.contents_section(entries), progress)
         _write_bids(part, request, settings, results)
@@ -142,7 +143,7 @@ def _free_target(request: ArchiveRequest) -> Path:
     here = request.folder.resolve()
     study = here.parent if (here.parent / "study.toml").is_file() else here
     shown = request.out or study.with_name(f"{study.name}-archive")
-    target = shown.resolve()
+    target = Path(os.path.realpath(shown))  # which a loop of links does not stop
     if target.is_relative_to(study):
         raise PlaceError(f"{shown}: lies in {study}, whose logs would then be read twice; choose an --out beside it")
     if within := [one for one in target.parents if (one / manifest.MANIFEST_FILE).exists()]:

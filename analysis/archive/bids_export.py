@@ -62,14 +62,14 @@ def export(
     """
     if not folder.is_dir():
         raise PlaceError(f"{folder}: no such folder; name the folder that holds the logs")
-    target = out.resolve()
+    target = Path(os.path.realpath(out))  # which a loop of links does not stop
     earlier = _earlier(target)
     mapping = load(ColumnMap, columns) if columns else None
     logs = read_logs([folder], track, mapping, include_synthetic=include_synthetic)
     refuse_nothing([folder], logs)
     results = results_of(folder, logs)
     runs, files = data_set_of(logs, members_of(results), name_of(results), free_text=free_text)
-    with placing.in_place(target) as part:
+    with placing.in_place(target, lambda: _earlier(target)) as part:
         for path, data in (files | filled_in(earlier, files)).items():
             placing.write_file(part, path, data)
     by_task = {task: [run for run in runs.runs if run.experiment == task] for task in runs.tasks}

@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -19,22 +19,41 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
 @contextmanager
-def in_place(target: Path) -> Iterator[Path]:
+def in_place(target: Path, check: Callable[[], object]) -> Iterator[Path]:
     """An empty folder beside `target` to fill; at the end it stands in its place, after an error nothing is left.
 
-    What an export that was killed left there is taken away first.
+    `check` raises if the place may not be taken: it is asked again just before, as somebody may have come meanwhile.
+    What an export that was killed left there is taken away first; one that is at work holds its folder.
     """
     storage.make_folder(target.parent)
     prefix = f".{target.name}.part-"
     for left_over in (path for path in target.parent.iterdir() if path.name.startswith(prefix)):
-        shutil.rmtree(left_over, ignore_errors=True)
+        with _folder_held(left_over) as is_ours:
+            if is_ours:
+                shutil.rmtree(left_over, ignore_errors=True)
     part = Path(tempfile.mkdtemp(prefix=prefix, dir=target.parent))
     try:
-        yield part
-        _replace(target, part)
+        with _folder_held(part):
+            yield part
+            check()
+            _replace(target, part)
         storage.sync_folder(target.parent)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _folder_held(folder: Path) -> Iterator[bool]:
+    """Hold a folder for this process, and say whether nobody else does. Where folders cannot be held, nobody does."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        yield os.name != "posix"
+        return
+    try:
+        yield storage.hold(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def is_free(target: Path) -> bool:

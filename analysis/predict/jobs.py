@@ -70,7 +70,8 @@ def _on_processes(workers: int, function: Function, pieces: Sequence[Any], done:
     except BrokenProcessPool as error:
         raise ConfigError("a worker process was killed (too little memory?); run again with fewer --workers") from error
     finally:  # once: leaving a `with` would shut down again, and take back that the rest is cancelled
-        pool.shutdown(wait=True, cancel_futures=True)
+        with no_interrupt():  # else a second Ctrl-C leaves workers that nobody tells to end, and waits for them
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _on_cluster(client: Any, function: Function, pieces: Sequence[Any], done: Done) -> None:

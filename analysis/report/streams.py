@@ -60,6 +60,9 @@ def _replace(error: UnicodeError) -> tuple[str, int]:
 def forgive_streams() -> None:
     """From now on no letter, and no byte that is none, stops what is printed or typed."""
     codecs.register_error(_HANDLER, _replace)
+    for name in ("stdout", "stderr"):  # closed by who started this: nobody reads what is printed
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
     for stream, errors in ((sys.stdin, "backslashreplace"), (sys.stdout, _HANDLER), (sys.stderr, _HANDLER)):
         if isinstance(stream, io.TextIOWrapper):  # not where a test or a notebook reads along
             stream.reconfigure(errors=errors)

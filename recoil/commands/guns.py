@@ -159,7 +159,7 @@ def bench(
     out: Annotated[Path, typer.Option(help="Folder for bench.json and the report.")] = Path("results/bench"),
     seed: FixedSeedOption = 1,
     repeats: Annotated[int, typer.Option(min=1, help="Runs, of whose times the median is told.")] = 7,
-    batch: Annotated[int, typer.Option(min=1, help="Shots of a batch.")] = 20_000,
+    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Shots of a batch.")] = 20_000,
     as_json: AsJsonOption = False,
 ) -> None:
     """What a digit of a shot, a trial, a person or 100 ms costs and buys here; and which post-hoc tests hold."""

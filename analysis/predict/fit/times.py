@@ -166,7 +166,6 @@ TIMES_CAVEATS = (
     "fastest, drifts towards 0, boundaries up); the mean over people of their own fits is the one to report.",
     "A person's own fit rests on few trials: see results/soak/decision.md for its bias and spread at 60 trials.",
     "EZ-diffusion knows no bias and no lapses, and takes forward and backward shots together.",
-    NO_OWN_TIMES,
 )
 
 
@@ -192,7 +191,6 @@ def _lines(found: TimesFit) -> Iterator[str]:
         yield "one fit of all together (a compromise person, intervals by person)"
         yield from map(_estimate_line, found.together.estimates)
     yield from _undetermined(found)
-    yield NO_OWN_TIMES
 
 
 def _estimate_line(one: MeanEstimate | Estimate) -> str:

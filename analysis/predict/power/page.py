@@ -155,7 +155,7 @@ def _reached(found: Power, row: Smallest | None) -> str:
     if row is None:
         return apa.NO_NUMBER
     if row.design is None:
-        return f"none (at most {apa.percent(row.most)})"
+        return f"none whose interval reaches it (at most {apa.percent(row.most)})"
     return _design_name(row.design, with_trials=_varies(found, "trials"))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from analysis.report.labels import display_name, named
 from analysis.report.section import Section, Table, shortened
+from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import OUTLIER_RULE
 from analysis.summary.results import DirectionStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
@@ -63,8 +64,14 @@ def _of_answers(found: DirectionStatistics | None) -> Iterator[str]:
 
 def _people_with(found: DirectionStatistics, forward: float, backward: float) -> list[str]:
     """The participants with these correct rates on forward and on backward shots, whatever the method."""
-    alike = (found.participants.array == forward) & (found.backward.participants.array == backward)
-    return [code for code, yes in zip(found.participants.codes, alike.all(axis=1).tolist(), strict=True) if yes]
+    on_backward = set(_who_has(found.backward.participants, backward))
+    return [code for code in _who_has(found.participants, forward) if code in on_backward]
+
+
+def _who_has(people: ByParticipant, rate: float) -> list[str]:
+    """The participants with the same rate for every method."""
+    alike = (people.array == rate).all(axis=1).tolist()
+    return [code for code, yes in zip(people.codes, alike, strict=True) if yes]
 
 
 def undefined_numbers(report: ReportData) -> Iterator[Section]:
