@@ -383,3 +383,12 @@ def test_the_guard_is_on_what_programs_read_as_formulas_alone() -> None:
 def test_a_closed_standard_output_is_no_error() -> None:
     done = subprocess.run(f"{RECOIL} simulate >&-", shell=True, capture_output=True, text=True, check=False)  # noqa: S602
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_nothing_takes_the_place_of_a_journal(recoil: Recoil, tmp_path: Path) -> None:
+    journal = tmp_path / "sub-P01_task-direction_journal.jsonl"
+    journal.write_text("what was said")
+    done = recoil("simulate", "--trace", journal)
+    assert done.returncode == 2
+    assert done.stderr == f"recoil: {journal}: is the journal of a run, which nothing replaces\n"
+    assert journal.read_text() == "what was said"

@@ -32,7 +32,7 @@ ParticipantKind = Literal["person", "synthetic"]
 """Who does a run."""
 Kind = Literal["run", "step", "outcome", "shot", "remark", "measured", "resumed", "stopped", "finished"]
 _KINDS = get_args(Kind)
-ENDING = "_journal.jsonl"
+ENDING = storage.JOURNAL_ENDING
 """How the name of every journal ends."""
 MOST_LINE, MOST_BYTES = 1 << 26, 1 << 29
 """No record is longer, and no journal: a run of ten thousand trials writes some ten million bytes."""

@@ -17,6 +17,7 @@ from pathlib import Path
 
 OWNER_FILE = 0o600
 OWNER_FOLDER = 0o700
+JOURNAL_ENDING = "_journal.jsonl"
 
 
 def make_folder(folder: Path) -> None:
@@ -191,10 +192,15 @@ def check_file(path: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Put a whole file in its place at once: readers see the old one or the new one, never a part."""
+    """Put a whole file in its place at once: readers see the old one or the new one, never a part.
+
+    A journal is the only full record of a run: nothing takes its place.
+    """
     part = path.with_name(f".{path.name}.part")
     with errors_name(path):
         check_file(path)
+        if path.name.endswith(JOURNAL_ENDING) and path.exists():
+            raise FileExistsError(errno.EEXIST, "is the journal of a run, which nothing replaces", str(path))
         part.unlink(missing_ok=True)
         try:
             descriptor = os.open(part, _APPEND | os.O_CREAT | os.O_EXCL, OWNER_FILE)
