@@ -166,6 +166,7 @@ TIMES_CAVEATS = (
     "fastest, drifts towards 0, boundaries up); the mean over people of their own fits is the one to report.",
     "A person's own fit rests on few trials: see results/soak/decision.md for its bias and spread at 60 trials.",
     "EZ-diffusion knows no bias and no lapses, and takes forward and backward shots together.",
+    NO_OWN_TIMES,
 )
 
 
