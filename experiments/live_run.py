@@ -11,7 +11,7 @@ import threading
 from collections import deque
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 from device import DeviceError, Gun, GunStatus
 from device.words import RecoilError
@@ -28,8 +28,6 @@ from experiments.session.steps import Outcome, Session, Step, step_after, step_r
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
-
-
 HALT_UNSAVED = (
     "The emergency stop is not on record: free the disk before you close the run. Else it begins without a test shot "
     "when it is resumed."
@@ -252,10 +250,15 @@ class LiveRun:
         try:
             self.journal.append("stopped", reason=why)
         except JournalError as error:
-            if not self.halt_unsaved:
-                raise
-            forgotten = "The emergency stop is not on record: note it; resumed, the run begins without a test shot"
-            raise JournalError(f"{error}. {forgotten}") from error
+            self.fail(error)
+
+    def fail(self, error: JournalError) -> NoReturn:
+        """Raise what went wrong with the journal; an emergency stop that is on no record is named with it."""
+        self.journal.catch_up()
+        if not self.halt_unsaved:
+            raise error
+        forgotten = "The emergency stop is not on record: note it; resumed, the run begins without a test shot"
+        raise JournalError(f"{error}. {forgotten}") from error
 
     def allow_shot(self) -> None:
         """Nothing if a shot may be fired now. `RunStopped`, `Held`: it may not."""
@@ -331,8 +334,9 @@ class LiveRun:
             self._screen.acknowledge(None, remark)
             return
         text = getattr(remark, "text", "")
-        self.halt_unsaved = self.halt_unsaved or isinstance(remark, Halted)
-        lost = HALT_UNSAVED if isinstance(remark, Halted) else f"Not saved: “{text}”" if text else ""
+        halt = isinstance(remark, Halted) and not isinstance(error, JournalGone)  # it is where the journal is now
+        self.halt_unsaved = self.halt_unsaved or halt
+        lost = HALT_UNSAVED if halt else f"Not saved: “{text}”" if text else ""
         self._screen.trouble(f"{error}. {lost}" if lost else str(error))
         if isinstance(error, JournalGone):
             self.offer(events.ResultsGone(cause=str(error)))

@@ -221,12 +221,11 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         request, anew = replace(request, anew_reason=GAVE_WAY), True
     else:
         _refuse_finished(where, contents)
+    os.close(hold_journal(where.journal))  # refused while another run is at it
     if contents is not None and not anew:
         if request.again == "ask":
-            os.close(hold_journal(where.journal))  # one that goes on now is not an unfinished one
             raise UnfinishedRun(where, contents)
         return contents
-    os.close(hold_journal(where.journal))  # refused while another run is at it
     _record_reason(where, request.anew_reason, clock)
     folders.set_aside(where)
     return None
@@ -426,7 +425,7 @@ def _to_the_end(
         raise
     except JournalError as error:
         desk.live.end(str(error))
-        raise
+        desk.live.fail(error)
     desk.live.end("")
     desk.live.journal.catch_up()  # a sensor's last word
     contents = read_journal(place.journal)

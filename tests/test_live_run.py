@@ -1098,6 +1098,29 @@ def test_a_run_that_ends_with_an_emergency_stop_on_no_record_says_that_it_will_b
     assert "The emergency stop is not on record: note it" in str(sitting.error)
 
 
+def test_an_emergency_stop_that_a_failing_answer_ends_at_once_is_named_with_the_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        monkeypatch.setattr(storage, "sync", full)
+        with sitting.live.news:  # the run has not come to the answer when the stop comes
+            assert sitting.live.offer(DUE[S.ASKING])
+            assert sitting.live.offer(events.EmergencyStop())
+        sitting.settle()
+    assert isinstance(sitting.error, JournalError)
+    assert "The emergency stop is not on record" in str(sitting.error)
+
+
+def test_an_emergency_stop_on_a_journal_that_was_moved_is_on_record_there(tmp_path: Path) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        journal = sitting.live.journal.path
+        journal.rename(journal.with_name("moved.jsonl"))
+        assert sitting.live.offer(events.EmergencyStop())
+        wait_for(lambda: any("was moved to" in text for text in sitting.window.troubles), "it is not said")
+        assert not sitting.live.halt_unsaved
+        assert '"kind":"halted"' in journal.with_name("moved.jsonl").read_text()
+
+
 def test_a_note_that_cannot_be_written_is_given_back_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with sat_at(S.ASKING, tmp_path) as sitting:
         with monkeypatch.context() as disk:

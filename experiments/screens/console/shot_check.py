@@ -22,6 +22,7 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.screens.console import widgets
+from experiments.screens.console.view import DISARMING
 from experiments.screens.console.widgets import TextLines
 from experiments.screens.phrases import phrase
 
@@ -272,7 +273,7 @@ class ShotPage(QWidget):
         self.stopped = True
         self._show(
             phrase("EMERGENCY STOP"),
-            phrase("Disarming. If the gun does not fall silent: {switch_off}", switch_off=SWITCH_OFF),
+            DISARMING,
             "bad",
         )
 

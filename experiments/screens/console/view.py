@@ -22,6 +22,8 @@ from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Present, Rate, Rest, Step, what
 
+DISARMING = phrase("Disarming. If the gun does not fall silent: SWITCH OFF ITS POWER.")
+"""What is shown from a stop until the gun has answered."""
 THANK_PARTICIPANT = phrase("Thank the participant.")
 """The last sentence, where nothing else comes next."""
 
@@ -413,7 +415,7 @@ def _since_halt(seen: Seen) -> str:
     """What the gun said since the emergency stop: what it said before says nothing of now."""
     gun = seen.gun
     if gun is None or gun.asked_s < seen.position.since_s:
-        return phrase("Disarming. If the gun does not fall silent: SWITCH OFF ITS POWER.")
+        return DISARMING
     if gun.status is not None and gun.status.state == "disarmed":
         return phrase("The gun itself says that it is disarmed.")
     return phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
