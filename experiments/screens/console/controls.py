@@ -363,8 +363,8 @@ class Controls:
         if self._open is None:
             return
         text = typed_line(self._view.typed("line"))
-        if text and self._live.offer(line_as_note(*self._open, text)):
-            self._view.say(phrase("What you had typed is kept as a note."), "wait")
+        if text:
+            self._live.offer(line_as_note(*self._open, text))
         self._close_line()
 
     def _close_line(self) -> None:
