@@ -168,7 +168,8 @@ def test_an_interrupted_job_on_processes_ends_and_leaves_none(tmp_path: Path, pr
             os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to everybody
             time.sleep(0.1)
         _, errors = running.communicate(timeout=PATIENCE_S)
-    assert running.returncode == 130, errors
+    ended = (130,) if presses == 1 else (130, -signal.SIGINT)  # a press more may come when all is done, at Python's end
+    assert running.returncode in ended, errors
     assert b"Traceback" not in errors
     wait_for(lambda: not alive_in(running.pid), processes)  # the interpreter's own tracker of resources ends later
 
