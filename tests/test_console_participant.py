@@ -182,6 +182,8 @@ def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot_and_in
             pressed_s.append(screen.keys.press(key))
             screen.until(lambda look, serial=asking.serial: look.serial != serial)
             seen_s.append(time.monotonic())
+        screen.to("asking", trial=3)
+        screen.participant_shows("ChoicePage", 3)  # an answer that comes before it leaves nothing to show
         asking = screen.to("asking", trial=4)
         screen.participant_shows("ChoicePage", 4)
         a_key_goes_into_a_note_and_a_page(screen, journal, shown=4)
