@@ -10,7 +10,7 @@ import math
 import re
 import signal
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from typing import Literal, Protocol, TypeGuard, get_args
@@ -60,6 +60,16 @@ def few_of_each(messages: Iterable[str]) -> Iterator[str]:
         if count > _LIKE:
             said = kind.rpartition(": ")[2] if len(seen) > 1 else ""
             yield f"... and {count - _LIKE} more like it{f' ({said.strip()})' if said else ''}"
+
+
+def first_few(names: Sequence[object], most: int) -> str:
+    """The first names of a list, and how many more there are.
+
+    >>> first_few(["P1", "P2", "P3"], 2), first_few(["P1", "P2"], 2)
+    ('P1, P2 and 1 more', 'P1, P2')
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(map(str, names[:most])) + more
 
 
 class RecoilError(Exception):

@@ -28,7 +28,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered
 from experiments.study.balance import journals, unread
-from experiments.study.folders import Place, PlaceError, check_code, place, set_aside_file
+from experiments.study.folders import Place, PlaceError, check_code, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
 
@@ -271,7 +271,7 @@ def rebuild_table(path: Path) -> RebuiltTable:
     messages = [contents.cut_message] if contents.cut_message else []
     same = table.exists() and table.read_bytes() == data
     if table.exists() and not same:
-        messages.append(f"{table}: differed from its journal and was set aside as {set_aside_file(table)}")
+        messages.append(f"{table}: differed from its journal and was set aside as {storage.set_aside_file(table)}")
     if not same:
         storage.write_whole(table, data)
     measured = shots_table(contents)

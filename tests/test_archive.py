@@ -17,10 +17,11 @@ from typing import Any, get_args
 
 import pytest
 
-from analysis.archive import archive_export, manifest, placing
+from analysis.archive import archive_export, manifest
 from analysis.archive.archive_export import Archived, ArchiveRequest
 from analysis.archive.redaction import FIRST_MOMENT, REDACTED, moment_of, redacted, redacted_config
 from analysis.archive.verify import verify
+from analysis.report import placing
 from experiments.record.journal import contents_of, ending_of, read_journal
 from experiments.session import remarks, steps
 from experiments.study.folders import PlaceError

@@ -13,9 +13,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.archive import bids, placing
+from analysis.archive import bids
 from analysis.archive import bids_export as feature
 from analysis.logs.reading import read_logs
+from analysis.report import placing
 from experiments.clock import RealClock, VirtualClock
 from experiments.load import load_setup, shipped_folder
 from experiments.record import tables

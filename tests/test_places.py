@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.design.plan import Plan
+from experiments.record import storage
 from experiments.study.balance import journals, used_rows
 from experiments.study.folders import (
     Place,
@@ -13,7 +14,6 @@ from experiments.study.folders import (
     known_codes,
     place,
     set_aside,
-    set_aside_file,
 )
 from experiments.study.register import read_register
 from tests.journals import write_head
@@ -135,7 +135,7 @@ def test_a_folder_is_set_aside_as_a_whole(tmp_path: Path) -> None:
     for number in (1, 2):
         (tmp_path / "study").mkdir()
         (tmp_path / "study" / "file").write_text(str(number))
-        assert (set_aside_file(tmp_path / "study") / "file").read_text() == str(number)
+        assert (storage.set_aside_file(tmp_path / "study") / "file").read_text() == str(number)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["study.aside-1", "study.aside-2"]
 
 

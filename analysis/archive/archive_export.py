@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from analysis.archive import bids_export, contents, datapackage, manifest, pages, placing, redaction
+from analysis.archive import bids_export, contents, datapackage, manifest, pages, redaction
 from analysis.archive.contents import CONTENTS, Entry, EntryState
 from analysis.archive.datapackage import Resource
 from analysis.archive.making import (
@@ -28,6 +28,7 @@ from analysis.logs.exclusions import Rules
 from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
+from analysis.report import placing
 from analysis.report.section import Section
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, unseen

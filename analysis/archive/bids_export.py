@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.archive import bids, placing
+from analysis.archive import bids
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
+from analysis.report import placing
+from device.words import first_few
 from experiments.config.door import load
 from experiments.load import load_study
 from experiments.record.journal import read_journal
@@ -120,8 +122,9 @@ def _earlier(target: Path) -> Path | None:
     paths = (path.relative_to(target).as_posix() for path in sorted(target.rglob("*")))
     foreign = [path for path in paths if not bids.is_ours(path)]
     if foreign:
-        shown = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" if len(foreign) > 3 else "")
-        raise PlaceError(f"{target}: holds what no export wrote ({shown}); move that away, or choose another --out")
+        raise PlaceError(
+            f"{target}: holds what no export wrote ({first_few(foreign, 3)}); move that away, or choose another --out"
+        )
     return target
 
 

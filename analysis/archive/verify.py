@@ -15,10 +15,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.archive import making, manifest, placing
+from analysis.archive import making, manifest
 from analysis.archive.contents import CONTENTS
 from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
 from analysis.logs.reading import Track
+from analysis.report import placing
 from analysis.report.serial import as_json
 from analysis.summary.analyze import result_files
 from analysis.summary.results import STATISTICS_FILE

@@ -33,6 +33,7 @@ from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.separated import SeparatedLine, TextFormat, separated_lines
 from analysis.logs.texts import CsvRecord
+from device.words import first_few
 from experiments.config.door import Model, once
 from experiments.config.lines import LineText
 from experiments.design.language import NumberScale
@@ -220,14 +221,10 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
 def _nobodys(faults: Sequence[BadLogError], mapping: ColumnMap) -> MappedLog:
     """The rows that nobody's code is on: they are left out, and the rows of others are used."""
     count, first = len(faults), faults[0]
-    rows = "this row is left out" if count == 1 else f"{count} such rows are left out, on lines {_some(faults)}"
+    lines = first_few([one.line for one in faults], _SHOWN)
+    rows = "this row is left out" if count == 1 else f"{count} such rows are left out, on lines {lines}"
     bad = BadLogError(f"{first.message}; {rows}, and the others used", first.line, first.column)
     return MappedLog(study=None, participant="", experiment=mapping.experiment, records=bad)
-
-
-def _some(faults: Sequence[BadLogError]) -> str:
-    more = f" and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
-    return ", ".join(str(one.line) for one in faults[:_SHOWN]) + more
 
 
 _SHOWN = 5

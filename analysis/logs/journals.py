@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
+from device.words import first_few
 from experiments.rebuild import JOURNAL_NAME, misnamed, table
 from experiments.record import journal, replay
 from experiments.record.journal import Contents, JournalError
@@ -201,8 +202,7 @@ def _gone(codes: list[str], count: int) -> str:
     if len(codes) == count:
         has = "the log has no journal" if count == 1 else f"none of the {count} logs has a journal"
         return f"{has} beside it, which every run writes, so nothing proves what is there; put the journals back"
-    shown = ", ".join(codes[:20]) + (f" and {len(codes) - 20} more" if len(codes) > 20 else "")
     return (
         f"{len(codes)} of {count} logs have no journal beside them, as the others have, so nothing proves them: "
-        f"{shown}; put the journals back"
+        f"{first_few(codes, 20)}; put the journals back"
     )

@@ -24,12 +24,13 @@ _MARKDOWN_MARKS = re.compile(r"[\\`*|~]|<(?=[a-zA-Z/!?])|(?<![a-zA-Z0-9])_|_(?![
 _TIGHT = re.compile(r" (?=[=<>] [\d.−])|(?<= [=<>]) (?=[\d.−])|(?<=\d) (?=%)|(?<=% CI) (?=\[)|(?<=,) (?=[\d.]+[)\]])")
 """Spaces that no line may break at: around `=` and `<` before a number, before a percent sign, in brackets."""
 
+REPORT_FILES = ("report.html", "report.md")
 _BARE = PageHead()
 
 
 def write_page(out: Path, title: str, parts: tuple[Section, ...], head: PageHead = _BARE) -> None:
     """Write `report.html` and `report.md` of finished sections; their pictures stand in `out / "figures"` already."""
-    for name in ("report.html", "report.md"):
+    for name in REPORT_FILES:
         text = _render(f"{name}.j2", title, parts, head, out / "figures")
         write_whole(out / name, text.encode("utf-8", "backslashreplace"))  # names of files may be no text
 

@@ -14,6 +14,7 @@ from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.paper import Paper, Prediction, load_paper
+from analysis.report import placing
 from analysis.report.section import Section
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, Tell, unseen, untold
@@ -29,10 +30,10 @@ from analysis.summary.results import STATISTICS_FILE, RulesApplied, StudyStatist
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
 from analysis.summary.summary import summarize
-from analysis.summary.tables_out import result_tables
+from analysis.summary.tables_out import TABLES, result_tables
+from device.words import first_few
 from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
-from experiments.record import storage
 from experiments.record.provenance import provenance
 
 _PARTS = 4
@@ -106,14 +107,13 @@ def analyze(
     from analysis.summary.sections.sections import write_report  # noqa: PLC0415 - who writes none has no need of figures
 
     files = _loaded(request)
-    logs = _usable(request, files, track)
-    with progress("analyze", _PARTS) as tell:
-        report, parts, edited = _analysis(request, files, logs, tell)
-        storage.make_folder(request.out)
-        write_report(request.out, report, tell)
-    for path, content in _tables(parts).items():
-        storage.make_folder((request.out / path).parent)
-        storage.write_whole(request.out / path, content)
+    with placing.results_in(request.out, STATISTICS_FILE, TABLES) as part:
+        logs = _usable(request, files, track)
+        with progress("analyze", _PARTS) as tell:
+            report, parts, edited = _analysis(request, files, logs, tell)
+            write_report(part, report, tell)
+        for path, content in _tables(parts).items():
+            placing.write_file(part, path, content)
     return report.statistics, (*edited, *_said(logs, report.statistics)), tuple(map(str, logs.notes))
 
 
@@ -209,8 +209,7 @@ def report_title(logs: Logs) -> str:
     """The studies that were read, alike for a folder and for its files named one by one."""
     every = {name for part in (logs, *logs.apart) for name in part.names.values()}
     names = sorted({shown_name(name) for name in every if name})
-    more = f" and {len(names) - _TITLED} more" if len(names) > _TITLED else ""
-    return f"Statistics of {', '.join(names[:_TITLED])}{more}" if names else "Statistics"
+    return f"Statistics of {first_few(names, _TITLED)}" if names else "Statistics"
 
 
 def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, *, apart: bool = False) -> _Analysed:

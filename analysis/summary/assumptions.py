@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from analysis.summary.results import Assumption, DirectionStatistics, PooledBinomial, Supplement, WithinStatistics
+from device.words import first_few
 
 EPSILON = 0.75
 """Below it the pooled Tukey test is not to be read: its familywise error grows to .064 at .72 and .088 at .45."""
@@ -69,8 +70,7 @@ def _ends(found: WithinStatistics, beside: Supplement) -> Assumption:
 
 def _outliers(found: Supplement) -> Assumption:
     people = sorted({outlier.participant for outlier in found.diagnostics.outliers.found})
-    shown = ", ".join(people[:5]) + (f" and {len(people) - 5} more" if len(people) > 5 else "")
-    warning = f"participants with a score far from the others' (kept): {shown}" if people else None
+    warning = f"participants with a score far from the others' (kept): {first_few(people, 5)}" if people else None
     return Assumption(assumption="No single participant decides a mean.", warning=warning)
 
 

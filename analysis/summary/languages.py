@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from analysis.logs.journals import RunFile
+from device.words import first_few
 from experiments.record import journal
 from experiments.record.journal import JournalError, ShownLanguage
 
@@ -21,12 +22,8 @@ def unchecked_languages(runs: Iterable[RunFile]) -> Iterator[str]:
         if shown is not None and not shown.checked_by:
             found.setdefault((run.experiment, f"{shown.code} ({shown.name})"), []).append(run.participant)
     for (experiment, said), codes in sorted(found.items()):
-        people = sorted(set(codes))
-        more = f" and {len(people) - _NAMED} more" if len(people) > _NAMED else ""
-        yield (
-            f"{experiment}: {', '.join(people[:_NAMED])}{more} saw and heard {said}, in texts that no native speaker "
-            "had checked"
-        )
+        people = first_few(sorted(set(codes)), _NAMED)
+        yield (f"{experiment}: {people} saw and heard {said}, in texts that no native speaker had checked")
 
 
 def _shown(path: Path) -> ShownLanguage | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from analysis.logs.files import Problem, shown_name
 from analysis.logs.level_map import LevelMap, MappedLevels, read_levels
+from analysis.report import placing
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.section import Section, origin_table
@@ -73,10 +74,10 @@ def mapped_thresholds(paths: list[Path], columns: Path, out: Path) -> MappedThre
     )
     if found.thresholds.reason:
         raise PlaceError(f"no psychometric function: {found.thresholds.reason}")
-    storage.make_folder(out)
-    storage.write_whole(out / "fit.json", as_json(found))
-    with labelled({}):
-        write_page(out, "Psychometric functions of another program's answers", tuple(_sections(found, out / "figures")))
+    title = "Psychometric functions of another program's answers"
+    with placing.results_in(out, placing.FIT_FILE) as part, labelled({}):
+        storage.write_whole(part / placing.FIT_FILE, as_json(found))
+        write_page(part, title, tuple(_sections(found, part / "figures")))
     return found
 
 

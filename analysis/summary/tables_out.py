@@ -28,6 +28,10 @@ MAX_NAME = 64
 _KEYS = [STUDY, "participant_id", "method"]
 
 
+TABLES = ("*_long.csv", "*_wide.csv")
+"""What the files of tables are called."""
+
+
 def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[str, bytes]:
     """File names and contents: `direction_long.csv`, `direction_wide.csv`, `preference_long.csv`, ..."""
     files: dict[str, bytes] = {}

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from device.words import first_few
 from experiments.catalogues.catalogue import ENGLISH, Language
 from experiments.config.door import ConfigError
 
@@ -59,9 +60,8 @@ def _named(letters: Iterable[str]) -> str:
     'U+00E9 é (LATIN SMALL LETTER E WITH ACUTE)'
     """
     every = sorted(letters)
-    shown = (f"U+{ord(one):04X} {one} ({unicodedata.name(one, 'no name')})" for one in every[:_MOST_NAMED])
-    more = f" and {len(every) - _MOST_NAMED} more" if len(every) > _MOST_NAMED else ""
-    return f"{', '.join(shown)}{more}"
+    shown = [f"U+{ord(one):04X} {one} ({unicodedata.name(one, 'no name')})" for one in every]
+    return first_few(shown, _MOST_NAMED)
 
 
 def shaped(text: str) -> str:

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from string import Formatter
 
+from device.words import first_few
+
 
 def _said(text: str, note: str) -> str:
     """A message, with a note for whoever translates it."""
@@ -85,8 +87,7 @@ _MOST_NAMED = 5
 def _problems(texts: dict[str, str]) -> Iterator[str]:
     missing = [repr(text) for text, found in texts.items() if not found.strip()]
     if missing:
-        more = f" and {len(missing) - _MOST_NAMED} more texts" if len(missing) > _MOST_NAMED else ""
-        yield f"lacks {', '.join(missing[:_MOST_NAMED])}{more}"
+        yield f"lacks {first_few(missing, _MOST_NAMED)}"
     for text, found in texts.items():
         if placeholders(text) != placeholders(found):
             yield f"{found!r}: must have the names in braces that {text!r} has, and no others"

@@ -215,3 +215,15 @@ def write_whole(path: Path, data: bytes) -> None:
             error.filename, error.filename2 = str(path), None  # nobody knows the other name
             raise
         sync_folder(path.parent)
+
+
+def set_aside_file(path: Path) -> Path:
+    """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
+    number = 1
+    while _aside(path, number).exists():
+        number += 1
+    return path.rename(_aside(path, number))
+
+
+def _aside(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.aside-{number}{path.suffix}")

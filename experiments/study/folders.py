@@ -128,19 +128,7 @@ def known_codes(results: Path, registered: Register) -> list[str]:
 
 def set_aside(run: Place) -> list[Path]:
     """Rename a run's files so that a fresh one can begin; nothing is lost. Returns the new names."""
-    return [set_aside_file(path) for path in (run.journal, run.table, run.shots) if path.exists()]
-
-
-def set_aside_file(path: Path) -> Path:
-    """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
-    number = 1
-    while _aside(path, number).exists():
-        number += 1
-    return path.rename(_aside(path, number))
-
-
-def _aside(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.stem}.aside-{number}{path.suffix}")
+    return [storage.set_aside_file(path) for path in (run.journal, run.table, run.shots) if path.exists()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

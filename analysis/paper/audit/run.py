@@ -57,6 +57,7 @@ from analysis.paper.audit.claims import (
 )
 from analysis.paper.audit.page import FindingEntry, counts, finding_entry, findings_text, sections
 from analysis.paper.paper import PaperHead, Participants, PublishedDirection, PublishedPreference
+from analysis.report import placing
 from analysis.report.page import write_page
 from analysis.report.serial import NotebookResult, as_json, plain
 from experiments.config.door import ConfigError, Model, load
@@ -186,7 +187,10 @@ def audit_file(name: str) -> Audited:
 
 def write(audited: Audited, out: Path) -> None:
     """Write `audit.json`, `report.html` and `report.md` into `out`."""
-    storage.make_folder(out)
-    storage.write_whole(out / "audit.json", as_json(audited.record))
     title = f"Audit: {audited.paper.paper.title or audited.source.stem}"
-    write_page(out, title, sections(audited.findings, audited.origin))
+    with placing.results_in(out, _RECORD) as part:
+        storage.write_whole(part / _RECORD, as_json(audited.record))
+        write_page(part, title, sections(audited.findings, audited.origin))
+
+
+_RECORD = "audit.json"

@@ -14,6 +14,7 @@ from analysis.predict.bench.figure import figure_of_trades
 from analysis.predict.bench.measured import BenchRequest, Bought, Measured
 from analysis.predict.bench.physics import physics
 from analysis.predict.bench.studies import missed_by_tests, post_hocs, procedure_errors
+from analysis.report import placing
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
@@ -23,7 +24,7 @@ from experiments.record.provenance import provenance
 __all__ = ["PARTS", "TRADES", "Bench", "BenchRequest", "bench", "bench_time_s", "trade_lines"]
 
 TRADES = "What one more costs, and what it buys"
-_FIGURE = "figure-trade"
+_FIGURE, _RECORD = "figure-trade", "bench.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,12 +49,12 @@ class Bench:
 
 def bench(out: Path, chosen: Sequence[str], request: BenchRequest) -> Bench:
     """Measure the chosen parts (all of `PARTS` if none is named); `out` gets `bench.json`, figure and report."""
-    storage.make_folder(out)
-    parts = {name: PARTS[name](request) for name in chosen or PARTS}
-    found = Bench(seed=request.seed, provenance=provenance(), parts=parts)
-    storage.write_whole(out / "bench.json", as_json(found.content))
-    sections = (*_trade(found, out / "figures"), *(one.section for one in parts.values()), _origin(found))
-    write_page(out, "Measured trades of Recoil", sections)
+    with placing.results_in(out, _RECORD) as part:
+        parts = {name: PARTS[name](request) for name in chosen or PARTS}
+        found = Bench(seed=request.seed, provenance=provenance(), parts=parts)
+        storage.write_whole(part / _RECORD, as_json(found.content))
+        sections = (*_trade(found, part / "figures"), *(one.section for one in parts.values()), _origin(found))
+        write_page(part, "Measured trades of Recoil", sections)
     return found
 
 

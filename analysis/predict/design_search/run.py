@@ -46,6 +46,7 @@ from analysis.predict.design_search.space import (
 )
 from analysis.predict.fit.percept_model import PAPER_RATES, PerceptFit, fit_percept
 from analysis.predict.jobs import RunPieces, on_processes
+from analysis.report import placing
 from analysis.report.copies import cores, process_copies
 from analysis.report.page import write_page
 from analysis.report.serial import as_csv, as_json
@@ -130,6 +131,7 @@ def _simulated(
 
 __all__ = ["DesignRequest", "design", "in_short", "search_time_s"]
 
+_RECORD = "design.json"
 COLUMNS = (
     *("friction_N", "voltage_V", "pulse_s", "status", "limit", "shooting_rate_Hz"),
     *("evidence", "predicted", "ci_low", "ci_high", "predicted_by_summary"),
@@ -143,13 +145,13 @@ def design(request: DesignRequest, workers: int | None, out: Path, progress: Pro
     The same request gives the same bytes however many workers there are. `ConfigError`: a request that cannot be met.
     """
     space = make_space(request)
-    storage.make_folder(out)
-    fit = fit_percept(PAPER_RATES, readings(space.gun))
-    found = search(space, fit, request.rate_above_Hz, lambda: on_processes(workers or cores()), progress)
-    with progress("report", 3) as tell:
-        result = _results(request, space, fit, found, tell)
-        _write(out, result, found.designs)
-        tell("written")
+    with placing.results_in(out, _RECORD) as part:
+        fit = fit_percept(PAPER_RATES, readings(space.gun))
+        found = search(space, fit, request.rate_above_Hz, lambda: on_processes(workers or cores()), progress)
+        with progress("report", 3) as tell:
+            result = _results(request, space, fit, found, tell)
+            _write(part, result, found.designs)
+            tell("written")
     return result
 
 
@@ -199,7 +201,7 @@ def _results(
 
 
 def _write(out: Path, found: DesignSearch, designs: Designs) -> None:
-    storage.write_whole(out / "design.json", as_json(found))
+    storage.write_whole(out / _RECORD, as_json(found))
     storage.write_whole(out / "designs.csv", as_csv(COLUMNS, (_cells(designs, place) for place in range(len(designs)))))
     with process_copies():
         parts = sections(found, designs, out / "figures")

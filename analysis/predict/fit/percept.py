@@ -26,7 +26,7 @@ from analysis.predict.fit.studies import (
     read_request,
 )
 from analysis.predict.synthetic_studies import piece_sizes, spread_sentence
-from analysis.report import apa
+from analysis.report import apa, placing
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
@@ -58,11 +58,10 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
         tell("predictions")
         judged, histograms = _judged(task, request, fit, tell) if pieces else (None, [])
     found = replace(found, judged=judged)
-    storage.make_folder(out)
-    storage.write_whole(out / "fit.json", as_json(found))
-    storage.write_whole(out / "percept.toml", config_text(found).encode())
-    with labelled(task.labels):
-        write_page(out, f"The percept fitted to {found.source}", sections(found, histograms, out / "figures"))
+    with placing.results_in(out, placing.FIT_FILE) as part, labelled(task.labels):
+        storage.write_whole(part / placing.FIT_FILE, as_json(found))
+        storage.write_whole(part / "percept.toml", config_text(found).encode())
+        write_page(part, f"The percept fitted to {found.source}", sections(found, histograms, part / "figures"))
     return found
 
 

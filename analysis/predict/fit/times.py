@@ -17,7 +17,7 @@ from analysis.logs.reading import Logs, Track, read_logs
 from analysis.predict.fit.figures import TimesPanel, figure_times
 from analysis.predict.fit.percept import NO_OWN_TIMES
 from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit, times_fit
-from analysis.report import apa
+from analysis.report import apa, placing
 from analysis.report.labels import display_name, labelled, named
 from analysis.report.page import write_page
 from analysis.report.section import PageHead, PageNotice, Picture, Section, Table, origin_table
@@ -69,13 +69,14 @@ def times(request: TimesRequest, out: Path, track: Track, progress: Progress) ->
     """
     lapses = lapse_range(request.lapses)
     mapping = load(ColumnMap, request.columns) if request.columns else None
-    logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
-    found, problems = _fit_of(logs, lapses, request, out, progress), list(logs.problems)
-    for part in logs.apart:
-        try:
-            _fit_of(part, lapses, request, out / folder_of(part.kind), progress)
-        except PlaceError as error:
-            problems.append(Problem(file=part.files[0].parent, line=None, column=None, message=str(error)))
+    with placing.results_in(out, placing.FIT_FILE) as folder:
+        logs = read_logs(request.paths, track, mapping, include_synthetic=request.include_synthetic)
+        found, problems = _fit_of(logs, lapses, request, folder, progress), list(logs.problems)
+        for part in logs.apart:
+            try:
+                _fit_of(part, lapses, request, folder / folder_of(part.kind), progress)
+            except PlaceError as error:
+                problems.append(Problem(file=part.files[0].parent, line=None, column=None, message=str(error)))
     return FoundTimes(fit=found, problems=tuple(problems), remarks=logs.remarks)
 
 
@@ -90,7 +91,7 @@ def _fit_of(logs: Logs, lapses: bool | LapseRange, request: TimesRequest, out: P
         raise PlaceError(f"--lapses {request.lapses}: {error}") from error
     found = times_fit(fitted, logs, request.lapses, bias=request.bias)
     storage.make_folder(out)
-    storage.write_whole(out / "fit.json", as_json(found))
+    storage.write_whole(out / placing.FIT_FILE, as_json(found))
     whose = "" if logs.kind == "real" else f" of {OF_KIND[logs.kind]}"
     title, head = f"The diffusion model fitted to response times{whose}", PageHead(notices=tuple(_notices(logs)))
     with labelled(logs.methods.labels):

@@ -28,6 +28,7 @@ from analysis.predict.power.shards import (
     tallies_of,
     write_shard,
 )
+from analysis.report import placing
 from analysis.report.copies import cores
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
@@ -53,6 +54,7 @@ def power(
     grid = make_grid(request)
     chunks = grid.chunks()
     kept = out / f"unfinished-{job_of(grid)[:12]}.jsonl"
+    placing.check_for_another(out, placing.POWER_FILE)
     with _processes(workers, scheduler) as run:
         tallies = _tallies(chunks, range(len(chunks)), run, kept, progress)
     found = _written(grid, tallies, out)
@@ -104,7 +106,6 @@ def merged_power(folder: Path, request: PowerRequest, out: Path) -> Power:
     shards = shards_in(folder)
     grid = make_grid(request) if request.config else _grid_of(*next(iter(shards.items())), request)
     tallies = tallies_of(folder, shards, _job(grid))
-    storage.make_folder(out)
     return _written(grid, tallies, out)
 
 
@@ -143,9 +144,9 @@ def _processes(workers: int | None, scheduler: str | None) -> AbstractContextMan
 def _written(grid: Grid, tallies: Mapping[int, Tally], out: Path) -> Power:
     """`power.json`, report and figures of the tallies of all chunks."""
     found = power_of(grid, (tallies[number] for number in range(len(tallies))), grid_assumptions(grid))
-    storage.write_whole(out / "power.json", as_json(found))
-    with labelled(grid.labels):
-        write_page(out, f"Simulated power: {grid.config.design.title}", sections(found, out / "figures"))
+    with placing.results_in(out, placing.POWER_FILE) as part, labelled(grid.labels):
+        storage.write_whole(part / placing.POWER_FILE, as_json(found))
+        write_page(part, f"Simulated power: {grid.config.design.title}", sections(found, part / "figures"))
     return found
 
 

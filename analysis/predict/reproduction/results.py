@@ -19,9 +19,10 @@ from analysis.predict.reproduction.people import drawn_studies, missing_methods,
 from analysis.predict.reproduction.study import ReproducedStudy
 from analysis.predict.simulate.panels import shot_panel
 from analysis.predict.synthetic_studies import pattern_odds
+from analysis.report import placing
 from analysis.report.terminal import Tell
 from analysis.summary.comparison import compare
-from analysis.summary.results import StudyStatistics
+from analysis.summary.results import STATISTICS_FILE, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.published import obtained_text
 from analysis.summary.sections.sections import write_report
@@ -48,7 +49,8 @@ def report_of_runs(study: ReproducedStudy, findings: Sequence[AuditFinding], out
     odds = tuple(_odds(study))
     tell("odds of the published pattern")
     comparison = tuple(_compared(study, findings, statistics))
-    write_report(out, _report(study, logs, statistics, odds, comparison))
+    with placing.results_in(out, STATISTICS_FILE) as part:
+        write_report(part, _report(study, logs, statistics, odds, comparison))
     tell("report")
     return Reproduced(statistics=statistics, comparison=comparison)
 

@@ -98,7 +98,7 @@ def claim_folder(study: ReproducedStudy, out: Path) -> None:
     if manifest.is_file():
         if json.loads(manifest.read_text(encoding="utf-8")) == wanted:
             return
-        folders.set_aside_file(out)
+        storage.set_aside_file(out)
     elif out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise folders.PlaceError(f"{out}: exists and is no reproduction of a study; choose another --out")
     storage.make_folder(out)

@@ -15,7 +15,7 @@ from analysis.predict.threshold_plan.run import (
     procedures_of,
     threshold_power,
 )
-from analysis.report import apa
+from analysis.report import apa, placing
 from analysis.report.figures.style import (
     drawn,
     legend_below,
@@ -36,12 +36,11 @@ _FIGURE = "figure-thresholds"
 
 def threshold_plan(request: ThresholdRequest, out: Path, progress: Progress) -> ThresholdPower:
     """Simulate, write `power.json`, report and figure into `out`; what was found is returned."""
-    with progress("power", len(procedures_of(request.config))) as tell:
-        found = threshold_power(request, tell)
-    storage.make_folder(out)
-    storage.write_whole(out / "power.json", as_json(found))
-    with labelled({}):
-        write_page(out, f"Planned threshold: {found.title}", sections_of_plan(found, out / "figures"))
+    with placing.results_in(out, placing.POWER_FILE) as part, labelled({}):
+        with progress("power", len(procedures_of(request.config))) as tell:
+            found = threshold_power(request, tell)
+        storage.write_whole(part / placing.POWER_FILE, as_json(found))
+        write_page(part, f"Planned threshold: {found.title}", sections_of_plan(found, part / "figures"))
     return found
 
 
