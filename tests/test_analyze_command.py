@@ -8,7 +8,8 @@ import os
 import signal
 import stat
 import subprocess
-from contextlib import suppress
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,11 @@ from analysis.logs.files import study_names
 from analysis.logs.reading import read_logs
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import MAX_NAME, short_names
+from experiments.record.storage import NO_FILE
+from experiments.study.register import REGISTER_FILE
 from tests.conftest import Recoil
 from tests.log_files import METHODS, trial_rows, trials_path, write_rows, write_study
 from tests.waiting import PATIENCE_S, wait_for
-from tests.warm_start import warm
 
 pytestmark = pytest.mark.slow
 
@@ -149,25 +151,55 @@ def test_a_bad_map_or_bad_rules_end_with_one_message_and_2(recoil: Recoil, tmp_p
     assert "Traceback" not in done.stderr
 
 
-def test_an_interrupt_among_the_logs_ends_with_130(tmp_path: Path) -> None:
+ON_A_DISK_THAT_HANGS = """
+import sys, time
+from pathlib import Path
+from experiments.record import storage
+from recoil.cli import main
+
+whole = storage.read_whole
+
+def hangs(path):
+    if "hangs" not in str(path):
+        return whole(path)
+    Path("is read").touch()
+    time.sleep(3600)
+
+storage.read_whole = hangs
+main()
+"""
+
+
+def test_an_interrupt_among_the_logs_ends_with_130_and_leaves_nothing(tmp_path: Path) -> None:
     lines = b"participant_id,experiment\n" + b"P01,direction\n" * 200
-    for number in range(400):
-        (tmp_path / f"{number}_trials.csv").write_bytes(lines)
-    endless, held = tmp_path / "endless", list[int]()
-    os.mkfifo(endless)
-
-    def is_read() -> bool:
-        """Whether the log without an end is being read; from then on it says nothing."""
-        with suppress(OSError):
-            held.append(os.open(endless, os.O_WRONLY | os.O_NONBLOCK))
-        return bool(held)
-
-    words = warm("analyze", tmp_path, endless, "--out", tmp_path / "out")
-    with subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
-        wait_for(is_read)
+    for name in (*map(str, range(400)), "hangs"):
+        (tmp_path / f"{name}_trials.csv").write_bytes(lines)
+    words = [sys.executable, "-c", ON_A_DISK_THAT_HANGS, "analyze", tmp_path, "--out", tmp_path / "out"]
+    with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
+        wait_for((tmp_path / "is read").exists)
         running.send_signal(signal.SIGINT)
         assert running.wait(PATIENCE_S) == 130
-    os.close(held[0])
+    assert not (tmp_path / "out").exists()
+
+
+def without_end(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, without_end], ids=["a pipe", "a device"])
+def test_what_is_no_file_keeps_nobody_waiting_and_is_named(
+    recoil: Recoil, sites: Path, tmp_path: Path, make: Callable[[Path], None]
+) -> None:
+    make(bad := sites / "oslo" / "results" / "sub-P09_trials.csv")
+    make(sites / "oslo" / "results" / "sub-P01" / "sub-P01_task-direction_journal.jsonl")
+    make(register := sites / "kyoto" / "results" / REGISTER_FILE)
+    done = recoil("analyze", sites, "--out", tmp_path / "out")
+    assert done.returncode == 1, done.stderr
+    assert f"{bad}: {NO_FILE if make is os.mkfifo else 'a link that leads to no file'}" in done.stderr
+    assert f"{register}: cannot be read ({NO_FILE})" in done.stderr
+    assert "sub-P01_task-direction_" in done.stderr
+    done = recoil("fit", "times", bad, "--out", tmp_path / "fit")
+    assert (done.returncode, f"{bad}: cannot be read: {NO_FILE}" in done.stderr) == (2, True)
 
 
 def test_names_of_studies_are_what_tells_them_apart() -> None:

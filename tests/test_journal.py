@@ -421,7 +421,7 @@ def test_a_part_left_by_a_crash_does_not_stand_in_the_way(tmp_path: Path) -> Non
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
 def test_a_pipe_that_is_called_a_journal_keeps_nobody_waiting(tmp_path: Path) -> None:
     os.mkfifo(pipe := tmp_path / f"sub-P01_task-direction{ENDING}")
-    with pytest.raises(JournalError, match=r"cannot be read \(it is no file\)"):
+    with pytest.raises(JournalError, match=r"cannot be read \(it is a pipe or a device, not a file\)"):
         read_journal(pipe)
-    with pytest.raises(OSError, match="it is no file"):
+    with pytest.raises(OSError, match="it is a pipe or a device, not a file"):
         storage.is_held(pipe)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -396,6 +397,20 @@ def test_an_edited_freeze_is_named_with_what_to_do(frozen: Path, how: str) -> No
     (said,) = freeze_status(frozen).problems
     assert said.startswith(f"{path}: was edited")
     assert "put the original back, from a copy" in said
+
+
+@pytest.mark.parametrize("name", ["preregistration-1.json", "preregistration-1.md"])
+def test_a_pipe_in_the_place_of_a_freeze_keeps_nobody_waiting(frozen: Path, name: str) -> None:
+    (frozen / name).unlink()
+    os.mkfifo(frozen / name)
+    (said,) = freeze_status(frozen).problems
+    assert said.startswith(f"{frozen / name}: ")
+
+
+def test_a_page_whose_lines_another_system_ends_is_not_edited(frozen: Path) -> None:
+    page = frozen / "preregistration-1.md"
+    page.write_bytes(page.read_bytes().replace(b"\n", b"\r\n"))
+    assert freeze_status(frozen).problems == ()
 
 
 def test_an_edited_freeze_is_named_wherever_the_study_is_looked_at(begun: Path) -> None:

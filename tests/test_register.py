@@ -214,6 +214,12 @@ def test_a_register_that_cannot_be_read_or_made_is_one_message(tmp_path: Path) -
         append(tmp_path / "file" / "results", joined("P01"), VirtualClock())
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_that_is_called_a_register_keeps_nobody_waiting(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / REGISTER_FILE)
+    assert "cannot be read (it is a pipe or a device, not a file)" in read_register(tmp_path).problem
+
+
 def test_a_register_held_by_another_program_is_waited_for_and_then_left(
     results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

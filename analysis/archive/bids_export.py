@@ -16,6 +16,7 @@ from analysis.report import placing
 from device.words import first_few
 from experiments.config.door import load
 from experiments.load import load_study
+from experiments.record import storage
 from experiments.record.journal import read_journal
 from experiments.record.provenance import recoil_version
 from experiments.record.replay import history
@@ -139,7 +140,7 @@ def is_export(target: Path) -> bool:
 def read_json(path: Path) -> dict[str, object]:
     """What a JSON file holds; nothing if there is none."""
     try:
-        values = json.loads(path.read_bytes())
+        values = json.loads(storage.read_whole(path))
     except (OSError, ValueError, RecursionError):
         return {}
     return values if isinstance(values, dict) else {}

@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from device.words import RecoilError
-from experiments.record import tables
+from experiments.record import storage, tables
 
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in tables.FILE_SUFFIX.values())
 _CODE = re.compile(r"sub-([^_]+)_")
 _TASK = re.compile(r"_task-([a-z]+)_[^/\\]*$")
 FULL_ONSET = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z")
 """An onset to the µs: no two runs have all the same."""
-_READ_ONLY = os.O_RDONLY | getattr(os, "O_BINARY", 0)
-_PIECE_BYTES = 1 << 16
 
 
 class BadLogError(RecoilError):
@@ -221,7 +219,7 @@ def _by_parts(path: str) -> str:
 def _why_not_read(entry: os.DirEntry[str], endings: tuple[str, ...]) -> str:
     """Why a link that looks like a log or a participant's folder is not read; empty if nothing is wrong."""
     if entry.name.endswith(endings):
-        return "" if entry.is_file() else _NO_FILE
+        return "" if entry.is_file() else _NO_FILE if entry.is_symlink() else storage.NO_FILE
     return _LINKED if entry.name.startswith("sub-") and entry.is_dir() else ""
 
 
@@ -265,21 +263,9 @@ def check_length(content: bytes, most: int = LONGEST_LOG) -> None:
 def read_content(path: str) -> bytes:
     """A file's bytes; `BadLogError` if it cannot be read."""
     try:
-        return _bytes(path)
+        return storage.read_whole(path)
     except OSError as error:
         raise BadLogError(f"cannot be read: {error.strerror or error}") from error
-
-
-def _bytes(path: str) -> bytes:
-    """A file's bytes with as few calls as can be: a log is mostly one piece."""
-    descriptor = os.open(path, _READ_ONLY)
-    try:
-        pieces = [os.read(descriptor, _PIECE_BYTES)]
-        while piece := os.read(descriptor, _PIECE_BYTES):
-            pieces.append(piece)
-    finally:
-        os.close(descriptor)
-    return pieces[0] if len(pieces) == 1 else b"".join(pieces)
 
 
 def study_names(folders: Iterable[str]) -> dict[str, str]:

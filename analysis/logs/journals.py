@@ -13,7 +13,7 @@ from typing import Literal
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.words import first_few
 from experiments.rebuild import JOURNAL_NAME, misnamed, table
-from experiments.record import journal, replay
+from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError
 from experiments.record.tables import FILE_SUFFIX, DataKind
 from experiments.session.history import answered
@@ -114,7 +114,7 @@ def compared(path: str, content: bytes) -> str | None:
     if not os.access(where, os.F_OK):  # of many thousands, much quicker than an exception
         return None
     try:
-        return compared_with(Path(where).read_bytes(), path, content)
+        return compared_with(storage.read_whole(where), path, content)
     except OSError as error:
         return f"its journal cannot be read ({error.strerror}), so nothing proves the table"
 

@@ -13,7 +13,7 @@ from pydantic import JsonValue
 from analysis.logs.journals import RunFile
 from analysis.logs.reading import Logs
 from experiments.config.door import read_toml
-from experiments.record import journal
+from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
 from experiments.record.provenance import recoil_version
 from experiments.study.folders import freeze_status
@@ -142,8 +142,7 @@ class _Looked:
 def _names_one(path: str) -> bool:
     """Whether a journal names a preregistration: a look that is cheap enough for ten thousand of them."""
     try:
-        with Path(path).open("rb") as file:
-            return b'"preregistration_sha256":' in file.readline()
+        return b'"preregistration_sha256":' in storage.first_line(path)
     except OSError:
         return False
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from analysis.logs.journals import RunFile
 from device.words import first_few
-from experiments.record import journal
+from experiments.record import journal, storage
 from experiments.record.journal import JournalError, ShownLanguage
 
 _MARK = b'"language":{"code":'
@@ -29,9 +29,8 @@ def unchecked_languages(runs: Iterable[RunFile]) -> Iterator[str]:
 def _shown(path: Path) -> ShownLanguage | None:
     """The language that a journal names, if any: a look that is cheap enough for ten thousand of them."""
     try:
-        with path.open("rb") as file:
-            if _MARK not in file.readline():
-                return None
+        if _MARK not in storage.first_line(path):
+            return None
         head = journal.head(path)
     except (OSError, JournalError):  # whose journal cannot be read is said elsewhere
         return None

@@ -62,7 +62,7 @@ def moved_to(descriptor: int) -> Path | None:
     return path if is_at(descriptor, path) else None
 
 
-def open_to_read(path: Path) -> int:
+def open_to_read(path: Path | str) -> int:
     """A file to be read. `OSError` where there is none: a pipe would be waited for, and a device has no end."""
     descriptor = os.open(path, _READ)
     mode = os.fstat(descriptor).st_mode
@@ -71,7 +71,10 @@ def open_to_read(path: Path) -> int:
     os.close(descriptor)
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    raise OSError(errno.EINVAL, "it is no file", str(path))
+    raise OSError(errno.EINVAL, NO_FILE, str(path))
+
+
+NO_FILE = "it is a pipe or a device, not a file"
 
 
 _READ = os.O_RDONLY
@@ -84,6 +87,28 @@ def read(path: Path, most: int, start: int = 0) -> bytes:
     with os.fdopen(open_to_read(path), "rb") as file:
         file.seek(start)
         return file.read(most) or b""  # nothing: a file of the system that has nothing to say just now
+
+
+def read_whole(path: Path | str) -> bytes:
+    """A file's bytes, with as few calls as can be. `OSError` as of `open_to_read`."""
+    descriptor = open_to_read(path)
+    try:
+        found = [os.read(descriptor, _LOG_BYTES)]
+        while piece := os.read(descriptor, _LOG_BYTES):
+            found.append(piece)
+    finally:
+        os.close(descriptor)
+    return found[0] if len(found) == 1 else b"".join(found)
+
+
+_LOG_BYTES = 1 << 16
+"""Most logs are one piece of so many."""
+
+
+def first_line(path: Path | str) -> bytes:
+    """The first line of a file. `OSError` as of `open_to_read`."""
+    with os.fdopen(open_to_read(path), "rb") as file:
+        return file.readline()
 
 
 def pieces(path: Path, length: int) -> Iterator[bytes]:

@@ -22,6 +22,7 @@ from experiments.clock import date_text
 from experiments.config.door import ConfigError, Model, StudyConfig, read_toml
 from experiments.config.setup import Setup, sha256
 from experiments.design.config import DesignConfig
+from experiments.record import storage
 
 STUDY_FILE = "study.toml"
 JOURNALS = "results/sub-*/sub-*_journal.jsonl"
@@ -251,7 +252,7 @@ def _broken_links(folder: Path, before: Sequence[Preregistration], one: Preregis
 def _edited_page(path: Path, one: Preregistration) -> Iterator[str]:
     """A page that is not there says nothing: the words stand in the other file too."""
     try:
-        there = path.read_text(encoding="utf-8")
+        there = storage.read_whole(path).decode().replace("\r\n", "\n")
     except FileNotFoundError:
         return
     except (OSError, UnicodeDecodeError) as error:
@@ -266,7 +267,7 @@ def _edited_page(path: Path, one: Preregistration) -> Iterator[str]:
 def _read(path: Path, number: int) -> Preregistration:
     """One that can be trusted. `PreregistrationError`: it is missing, or was edited."""
     try:
-        found = json.loads(path.read_bytes(), object_pairs_hook=_once)
+        found = json.loads(storage.read_whole(path), object_pairs_hook=_once)
         stated = found.pop("sha256", None)
         one = Preregistration.model_validate_json(json.dumps(found))
     except FileNotFoundError as error:

@@ -155,7 +155,7 @@ def read_register(results: Path) -> Register:
     """The register of a results folder, as far as it can be trusted; an empty one if there is none."""
     path = results / REGISTER_FILE
     try:
-        data = path.read_bytes()
+        data = storage.read_whole(path)
     except (FileNotFoundError, NotADirectoryError):
         return Register(path=path)
     except OSError as error:
