@@ -141,6 +141,22 @@ def test_the_mean_person_is_found_where_people_differ() -> None:
     assert "lapse" not in means
 
 
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_no_mean_share_of_lapses_reaches_below_none(seed: int) -> None:
+    """Most people have none: the mean less its half interval would be below 0."""
+    found = {mean.name: mean for mean in fit_people(made(seed, people=4, lapse=0.01), lapses=RANGE_S).means}
+    lapse = found["lapse"]
+    assert lapse.value < 2 * lapse.se
+    assert lapse.ci_low == 0.0 < lapse.value < lapse.ci_high < 1.0
+    assert all(found[name].ci_low > 0.0 for name in ("boundary speed", "boundary accuracy", "non_decision_s"))
+
+
+def test_lapses_that_nobody_has_get_no_interval_and_not_that_from_0_to_0() -> None:
+    (lapse,) = (mean for mean in fit_people(STUDY, lapses=(0.0, 5.0)).means if mean.name == "lapse")
+    assert (lapse.value < 1e-4, lapse.people) == (True, 14)
+    assert [math.isnan(one) for one in (lapse.se, lapse.ci_low, lapse.ci_high)] == [True] * 3
+
+
 def test_a_person_who_lacks_a_method_is_left_out_and_named() -> None:
     kept = ~((STUDY.person == 3) & (STUDY.condition == 0))
     some = trials_of(

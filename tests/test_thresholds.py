@@ -226,8 +226,27 @@ def test_the_pages_have_groups_differences_people_and_a_panel_each(
     assert all(len(row) == len(table.header) for table in section.tables for row in table.rows)
     (sentence,) = threshold_sentences(summary, summary.questions["response"])
     assert sentence.startswith("Threshold in voltage in V, mean over people: Asymmetric Force I: 9.0")
+    assert not any("below 0" in paragraph for paragraph in section.paragraphs)
     figure_functions(summary, summary.questions["response"].thresholds, tmp_path / "functions")  # type: ignore[arg-type]
     assert (tmp_path / "functions.png").is_file()
+
+
+def test_an_interval_that_reaches_below_what_any_level_can_be_is_told() -> None:
+    config = load_setup("threshold").config
+    rows = [
+        {"participant_id": who, "method": "asymmetric-1", "track": 1, "voltage_V": level, "direction": "forward"}
+        | {"response": "forward" if place % 10 < right else "backward", "correct": int(place % 10 < right)}
+        for who in ("A", "B")
+        for level, right in ((4.0, 8), (6.0, 9))  # near the threshold at the lowest level already
+        for place in range(10)
+    ]
+    summary = summarise(config, pd.DataFrame(rows))
+    found = summary.questions["response"].thresholds
+    assert found is not None
+    assert [one.fit.threshold.low < 0 for one in found.conditions[0].people if one.fit is not None] == [True, True]
+    (section,) = threshold_sections("made", summary)
+    (said,) = (paragraph for paragraph in section.paragraphs if "below 0" in paragraph)
+    assert said.startswith(("2 intervals of the threshold reach below 0", "3 intervals of the threshold reach below 0"))
 
 
 def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -> None:

@@ -60,10 +60,30 @@ def fit_people(
     whole = [one.reason is None and tuple(e.name for e in one.estimates) == names for one in fits]
     kept = [one for one, good in zip(fits, whole, strict=True) if good]
     return PeopleFit(
-        means=tuple(mean_estimate(name, [one[name].value for one in kept], BEYOND_INTERVAL) for name in names),
+        means=tuple(_mean(name, kept) for name in names),
         fits=tuple(fits),
         left_out=tuple(place for place, good in enumerate(whole) if not good),
     )
+
+
+def _mean(name: str, fits: Sequence[DiffusionFit]) -> MeanEstimate:
+    """The mean over people of a parameter; its interval is cut where the parameter's range ends.
+
+    It has none where nobody's own data tell the parameter, as of lapses that may as well be none: equal ends are no
+    precision.
+    """
+    found = mean_estimate(name, [one[name].value for one in fits], BEYOND_INTERVAL)
+    if fits and all(name in one.unidentified for one in fits):
+        return replace(found, se=math.nan, ci_low=math.nan, ci_high=math.nan)
+    low, high = _range(name)
+    return replace(found, ci_low=max(found.ci_low, low), ci_high=min(found.ci_high, high))
+
+
+def _range(name: str) -> tuple[float, float]:
+    """Between what a parameter is: a share is from 0 to 1, a boundary and a time from 0, a drift anything."""
+    if name.startswith("drift"):
+        return -math.inf, math.inf
+    return 0.0, 1.0 if name in {"start", "lapse"} else math.inf
 
 
 def of_person(trials: Trials, person: int) -> Trials:

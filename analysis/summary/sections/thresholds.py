@@ -66,7 +66,7 @@ def _section(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Sec
         return Section(title=title, paragraphs=(f"None was fitted: {of.reason}.",))
     return Section(
         title=title,
-        paragraphs=(_what(of), *_who(of), *_without(of)),
+        paragraphs=(_what(of), *_who(of), *_without(of), *_below_zero(of)),
         pictures=(_picture(name, asked, found, of), *_picture_of_tracks(name, asked, found, of)),
         tables=tuple(_tables(asked, found, of)),
     )
@@ -119,6 +119,21 @@ def _without(of: Thresholds) -> Iterator[str]:
         )
     if unfitted:
         yield f"{unfitted} of {len(people)} had too few answers for a fit: below {FEWEST_ANSWERS}, or at one level."
+
+
+def _below_zero(of: Thresholds) -> Iterator[str]:
+    """What an interval says that reaches below 0 though every level is above."""
+    if min(point.level for one in of.conditions for point in one.points) <= 0:
+        return
+    fits = [one.fit for condition in of.conditions for one in condition.people if one.fit is not None]
+    below = sum(fit.threshold.low < 0 for fit in fits)
+    below += sum(one.group is not None and one.group.threshold.low < 0 for one in of.conditions)
+    if below:
+        yield (
+            f"{below} interval{'s' * (below > 1)} of the {_measure(of)} reach{'es' * (below == 1)} below 0, where no "
+            "level is: the answers do not tell the lower end there, the prior does, which begins half the levels' span "
+            "below the lowest. More trials at low levels would tell."
+        )
 
 
 def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Picture:
