@@ -63,7 +63,7 @@ CAVEATS = {
     "people. Where people differ it is biased and its intervals are too short. In 200 simulated studies with people "
     "who differ by an SD of 20 % in drift and 10 % in boundary and non-decision time, it pulled a drift of 1.80 by "
     "−0.13, a boundary of 1.20 by +0.09 and the non-decision time by −35 ms, whose 95 % intervals then held the truth "
-    "in 5 % (results/soak/decision.md).",
+    "in 5 %.",
 }
 """What each measure can and cannot tell."""
 

@@ -132,7 +132,7 @@ def _draw_times(axes: Axes, panel: TimesPanel) -> None:
     told = "" if panel.instruction == "neutral" else f", {panel.instruction}"
     axes.set_title(f"{drawn_name(panel.method)}{told}", loc="left", fontsize=9.0)
     if len(panel.grid_s):
-        axes.set_xlim(0.0, panel.grid_s[-1])
+        axes.set_xlim(0.0, 1.02 * panel.grid_s[-1])  # a mark at the end is whole
     axes.set_ylim(0.0, 102.0)
 
 
