@@ -34,7 +34,6 @@ from experiments.record.journal import (
     ShownLanguage,
     begun,
     hold_journal,
-    read_journal,
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
@@ -419,7 +418,7 @@ def _to_the_end(
         why = str(stop) or "interrupted"
         desk.live.end(why)
         desk.live.write_stop(why)
-        saved = _write_table(place, read_journal(place.journal))
+        saved = _write_table(place, desk.live.journal.read_back())
         if isinstance(stop, RunStopped):
             stop.saved = saved
         raise
@@ -427,8 +426,7 @@ def _to_the_end(
         desk.live.end(str(error))
         desk.live.fail(error)
     desk.live.end("")
-    desk.live.journal.catch_up()  # a sensor's last word
-    contents = read_journal(place.journal)
+    contents = desk.live.journal.read_back()
     hashes = {"table_sha256": hashlib.sha256(table(contents)).hexdigest(), "journal_sha256": contents.sha256}
     desk.live.journal.append("finished", **hashes)
     return _write_table(place, contents)

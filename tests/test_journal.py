@@ -95,6 +95,21 @@ def test_a_record_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
             assert len(read_journal(tmp_path / "j").records) == count
 
 
+def test_what_is_read_back_is_all_that_was_written_or_refused(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    with Journal.create(path, VirtualClock()) as journal:
+        journal.append("run", **HEAD)
+        journal.append("step", body=1)
+        assert journal.read_back() == read_journal(path)
+        journal.append("step", body=2)
+        os.truncate(path, len(b"".join(path.read_bytes().splitlines(keepends=True)[:2])))  # whole records, one fewer
+        with pytest.raises(JournalError, match=r"holds 2 records, and not the 3 that were written"):
+            journal.read_back()
+    contents = read_journal(path)
+    with Journal.reopen(contents, VirtualClock()) as journal:
+        assert journal.read_back() == contents
+
+
 def test_one_record_is_one_line_of_json(path: Path) -> None:
     lines = lines_of(path)
     assert len(lines) == RECORDS

@@ -1,6 +1,7 @@
 import csv
+import os
 from collections import Counter
-from contextlib import closing, suppress
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.record.journal import Journal, read_journal
+from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.runner import MAX_FAILURES
@@ -262,6 +263,35 @@ def test_an_interrupted_run_leaves_a_reason_and_a_table_of_what_was_answered(tmp
         rows = list(csv.DictReader(file))
     assert len(rows) == 12
     assert [number for number, row in enumerate(rows) if row["response"]] == [0]
+
+
+class LosingScreen(SyntheticScreen):
+    """Somebody who does all, and loses the journal's last record at an acknowledgement of a number."""
+
+    at, journal, acknowledged = 0, Path(), 0
+
+    def acknowledge(self, step: Step | None, outcome: Outcome | Remark) -> None:
+        super().acknowledge(step, outcome)
+        self.acknowledged += 1
+        if self.acknowledged == self.at:
+            os.truncate(self.journal, self.journal.read_bytes().rfind(b"\n", 0, -1) + 1)
+
+
+def test_an_answer_that_was_lost_on_the_disk_is_missed_at_the_end(tmp_path: Path) -> None:
+    """The journal is whole without it: what was given is known to the run alone."""
+    screens = list[LosingScreen]()
+
+    def losing(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> SyntheticScreen:
+        screens.append(screen := LosingScreen(setup.config, synthetic_participant_of(setup, plan), clock))
+        screen.at = screens[0].acknowledged
+        screen.journal = place(tmp_path, plan.participant_id, "direction").journal
+        return screen
+
+    for code in ("P01", "P02"):
+        request = RunRequest(setup=SETUPS["direction"], participant_id=code, results=tmp_path, seed=1)
+        with pytest.raises(JournalError, match="not the") if code == "P02" else nullcontext():
+            run(request, losing, VirtualClock())
+    assert not read_journal(screens[1].journal).finished
 
 
 def test_the_gun_is_closed_and_the_journal_let_go_after_a_run(tmp_path: Path) -> None:

@@ -206,6 +206,17 @@ class Journal:
         """Return when all that was submitted is written, or was refused, of which whoever submitted it is told."""
         self._writer.submit(_nothing_more).result()
 
+    def read_back(self) -> Contents:
+        """What is on the disk, held against all that was written. `JournalError` if it is anything else."""
+        self.catch_up()
+        contents = read_journal(self.path)
+        if contents.link != self._link:  # each record has the hash of the one before: the last one proves them all
+            raise JournalError(
+                f"{self.path}: holds {len(contents.records)} records, and not the {self._count} that were written, so "
+                "something else changed it; copy it away as it is, and look at the disk before the next run"
+            )
+        return contents
+
     def _write(self, record: dict[str, object]) -> None:
         if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
             raise JournalGone(self._gone)
