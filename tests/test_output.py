@@ -385,10 +385,37 @@ def test_a_closed_standard_output_is_no_error() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_nothing_takes_the_place_of_a_journal(recoil: Recoil, tmp_path: Path) -> None:
+def test_nothing_takes_the_place_of_a_journal(tmp_path: Path) -> None:
     journal = tmp_path / "sub-P01_task-direction_journal.jsonl"
     journal.write_text("what was said")
-    done = recoil("simulate", "--trace", journal)
-    assert done.returncode == 2
-    assert done.stderr == f"recoil: {journal}: is the journal of a run, which nothing replaces\n"
+    with pytest.raises(FileExistsError, match="is the journal of a run, which nothing replaces"):
+        storage.write_whole(journal, b"a table")
     assert journal.read_text() == "what was said"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("sub-P01_task-direction_trials.csv", ["--trace"]),
+        ("gun.toml", ["--trace"]),
+        ("other.csv", ["--trace"]),
+        ("other.csv", ["--method", "vibration", "--trace"]),
+        ("other.csv", ["--vary", "voltage_V=10:20:3", "--table"]),
+        ("other.parquet", ["--vary", "voltage_V=10:20:3", "--table"]),
+    ],
+)
+def test_tables_of_shots_replace_each_other_and_nothing_else(
+    recoil: Recoil, tmp_path: Path, name: str, words: list[str]
+) -> None:
+    file = tmp_path / name
+    file.write_text("name,age\nsomebody's,7\n")
+    done = recoil("simulate", *words, file)
+    option = words[-1]
+    said = f"recoil: {option} {file}: holds something else, which is not replaced; name another file\n"
+    assert (done.returncode, done.stderr) == (2, said)
+    assert file.read_text() == "name,age\nsomebody's,7\n"
+    file.write_bytes(b"")  # as a program that gives out names leaves it
+    assert recoil("simulate", *words, file).returncode == 0
+    assert recoil("simulate", "--set", "pulse_s=0.02", *words, file).returncode == (2 if "vibration" in words else 0)
+    if "--table" in words:
+        assert recoil("simulate", "--vary", "pulse_s=0.01,0.02", "--table", file).returncode == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -196,8 +196,19 @@ def collision_with_stop(parameters: GunParameters, impact_speed_m_s: float | Non
     )
 
 
+def check_own(option: str, path: Path, is_ours: Callable[[Path], bool]) -> None:
+    """`ConfigError` for a file in the place of a table that is none of ours; an empty one is nothing."""
+    if path.is_file() and path.stat().st_size and not is_ours(path):
+        raise ConfigError(f"{option} {path}: holds something else, which is not replaced; name another file")
+
+
+def header_of(path: Path) -> str:
+    """The first line of a CSV file; of what is none, some text."""
+    return storage.first_line(path).decode("utf-8", "replace").strip()
+
+
 def write_trace(parameters: GunParameters, path: Path) -> None:
-    """The shot over time as CSV; units end the names."""
+    """The shot over time as CSV; units end the names. `ConfigError` where something else is."""
     shot = trace(parameters)
     names = [field.name for field in fields(shot) if field.name != "summary"]
     _write_columns(path, {name: getattr(shot, name).tolist() for name in names})
@@ -205,6 +216,7 @@ def write_trace(parameters: GunParameters, path: Path) -> None:
 
 def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
     """Columns of one length as CSV; the folder is made if it is missing."""
+    check_own("--trace", path, lambda there: header_of(there) == ",".join(columns))
     storage.make_folder(path.parent)
     storage.write_whole(path, as_csv(columns, zip(*columns.values(), strict=True)))
 

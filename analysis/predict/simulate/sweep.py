@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from analysis.predict.simulate.request import SimulateRequest
 from analysis.predict.simulate.scene import ScenePick, picked, scene_section
-from analysis.predict.simulate.shot import PARAMETER_KINDS
+from analysis.predict.simulate.shot import PARAMETER_KINDS, check_own, header_of
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress
@@ -66,11 +66,22 @@ class Sweep(SweepOrigin):
 
 
 def check_place(path: Path) -> None:
-    """`ConfigError` for a name that says neither Parquet nor CSV, or that a folder has."""
+    """`ConfigError` for a name that says neither Parquet nor CSV, or that a folder or something else's table has."""
     if path.suffix not in (".parquet", ".csv"):
         raise ConfigError(f"--table {path}: must end with .parquet or .csv")
     if path.is_dir():
         raise ConfigError(f"--table {path}: is a folder; name a file")
+    check_own("--table", path, _is_own)
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a file is a table of shots, whatever was varied."""
+    if path.suffix == ".csv":
+        return header_of(path).endswith(",".join(("status", *NUMBERS)))
+    try:
+        return b"recoil" in (pyarrow.parquet.read_schema(path).metadata or {})
+    except pa.ArrowInvalid:
+        return False
 
 
 @contextmanager
