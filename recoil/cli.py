@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import signal
 import sys
 import threading
@@ -115,6 +116,7 @@ def main() -> None:
 
 
 def _carry_out(words: Sequence[str]) -> None:
+    _refuse_empty(words)
     try:
         _line_of(words)()
     except (OSError, RecoilError):
@@ -123,6 +125,14 @@ def _carry_out(words: Sequence[str]) -> None:
         if _INTERRUPTED_BY:  # which a library made an error of its own of
             raise KeyboardInterrupt from error
         raise
+
+
+def _refuse_empty(words: Sequence[str]) -> None:
+    """`RecoilError` for a word that is empty: as a path it would be the folder where one is."""
+    for before, word in zip(["recoil", *words], words, strict=False):
+        if not word or re.fullmatch("--[a-z-]+=", word):
+            where = word or f"what stands after {before}"
+            raise RecoilError(f"{where}: is empty; give a value (is a variable of the shell not set?), or leave it out")
 
 
 def _line_of(words: Sequence[str]) -> typer.Typer:

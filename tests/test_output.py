@@ -366,6 +366,29 @@ def test_a_full_disk_names_the_file_that_did_not_fit(tmp_path: Path) -> None:
     assert raised.value.filename == str(tmp_path / "table.csv")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+@pytest.mark.parametrize("words", ["simulate", "simulate --json"])
+def test_a_full_disk_behind_the_output_is_told(words: str) -> None:
+    done = subprocess.run(f"{RECOIL} {words} > /dev/full", shell=True, capture_output=True, text=True, check=False)  # noqa: S602
+    assert (done.returncode, done.stderr) == (2, "recoil: the output: No space left on device\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "where"),
+    [
+        (["analyze", "", "--out", "out"], "what stands after analyze"),
+        (["simulate", "--plot="], "--plot="),
+        (["run", "direction", "--participant", "P01", "--results", ""], "what stands after --results"),
+    ],
+)
+def test_an_empty_word_is_not_the_folder_where_one_is(
+    recoil: Recoil, tmp_path: Path, words: list[str], where: str
+) -> None:
+    done = recoil(*words)
+    assert (done.returncode, done.stderr.startswith(f"recoil: {where}: is empty; give a value")) == (2, True)
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == []
+
+
 def test_a_number_that_is_just_beyond_its_range_is_told_with_all_its_digits(tmp_path: Path) -> None:
     rows = rating_rows("P01")
     path = write_rows(ratings_path(tmp_path, "P01"), [row | {"rating": "10.0000001"} for row in rows])

@@ -29,7 +29,7 @@ def in_place(target: Path, check: Callable[[], object]) -> Iterator[Path]:
     `check` raises if the place may not be taken: it is asked again just before, as somebody may have come meanwhile.
     """
     storage.make_folder(target.parent)
-    with _part(target.parent, f".{target.name}.part-") as part:
+    with _part(target.parent, f".{target.name}.part-") as part, _errors_name(target, part):
         yield part
         check()
         _replace(target, part)

@@ -18,6 +18,7 @@ from analysis.report.section import Section, Table
 from analysis.report.serial import as_json as in_json
 from analysis.report.streams import results, takes_all, visible
 from device.words import RecoilError
+from experiments.record import storage
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -131,8 +132,9 @@ def _drawn(table: Table, *, ruled: bool, unfolded: int) -> RichTable:
 def show(result: Any, text: str, as_json: bool) -> None:
     """The result on stdout, at once: for programs, or the text for people."""
     out = results()
-    out.write(in_json(result, in_ascii=not takes_all(out)).decode() if as_json else f"{visible(text)}\n")
-    out.flush()
+    with storage.errors_name("the output"):
+        out.write(in_json(result, in_ascii=not takes_all(out)).decode() if as_json else f"{visible(text)}\n")
+        out.flush()
 
 
 def each_of(names: Sequence[_Name], do: Callable[[_Name], _Found]) -> tuple[list[_Found], int]:

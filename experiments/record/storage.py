@@ -199,7 +199,7 @@ def _locked(descriptor: int, *, shared: bool) -> bool:
 
 
 @contextmanager
-def errors_name(path: Path) -> Iterator[None]:
+def errors_name(path: Path | str) -> Iterator[None]:
     """Errors of the system that say of no file where they happened, as a full disk does, say it of this one."""
     try:
         yield

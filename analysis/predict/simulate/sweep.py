@@ -155,7 +155,7 @@ def _whole(path: Path) -> Iterator[IO[bytes]]:
     part = path.with_name(f".{path.name}.part")
     part.unlink(missing_ok=True)
     try:
-        with os.fdopen(storage.create(part), "wb") as stream:
+        with storage.errors_name(path), os.fdopen(storage.create(part), "wb") as stream:
             yield stream
             stream.flush()
             storage.sync(stream.fileno())
