@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from device.parameters import damper_friction
 from device.physics import GunParameters, hand, simulate
 from device.physics.hand import HandMechanics, compliant_collision, rigid_collision, simulate_held
-from device.physics.traces import energy_balance
+from device.physics.traces import Segment, energy_balance
 from tests.extreme_guns import guns_about
 
 VARIANTS = [(f, off, emf) for f in (0.21, 1.12) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
@@ -39,6 +39,17 @@ def test_the_audit_of_any_gun_closes(gun):
     assert abs(found.residual_impulse_Ns) < 1e-10
     if gun.emf == "reciprocal":
         assert abs(found.created_J) < 1e-9 * size
+
+
+@pytest.mark.parametrize("inductance_H", [1e3, 1e9])
+def test_a_current_that_takes_hours_to_fade_at_rest_is_audited_in_few_looks(monkeypatch, inductance_H):
+    """Its time constant, not that of the spring, says how far apart they may be: 350 s of 1e3 H."""
+    looks, at = [], Segment.at
+    monkeypatch.setattr(Segment, "at", lambda self, time_s: looks.append(time_s) or at(self, time_s))
+    found = energy_balance(GunParameters(inductance_H=inductance_H, drive_off="shorted"))
+    assert found.heat_J > 0.0
+    assert abs(found.residual_J) < 1e-14 * found.supplied_J
+    assert len(looks) < 2000
 
 
 def test_a_damper_for_the_way_back_only_leaves_the_recoil_alone():

@@ -302,8 +302,9 @@ def _pieces(segment: Segment) -> Iterator[tuple[float, float]]:
     end_s = segment.end_s
     if end_s == math.inf:
         end_s = segment.start_s + (_FADED * time_constant_s if segment.live else 0.0)
-    start_s, width_s = segment.start_s, (4 * time_constant_s if segment.live else _PIECE_S)
+    most_s = _PIECE_S if segment.kind == FREE else max(_PIECE_S, 4 * time_constant_s)  # at rest only current changes
+    start_s, width_s = segment.start_s, min(4 * time_constant_s, most_s) if segment.live else _PIECE_S
     while start_s < end_s:
         following_s = min(start_s + width_s, end_s)
         yield start_s, following_s
-        start_s, width_s = following_s, min(2 * width_s, _PIECE_S)
+        start_s, width_s = following_s, min(2 * width_s, most_s)
