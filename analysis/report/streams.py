@@ -24,6 +24,8 @@ _PLAIN = {
     "≈": "~",
     "±": "+-",
     "√": "sqrt",
+    "°": "deg",
+    "µ": "u",
 }
 _ESCAPED_BYTE = range(0xDC80, 0xDD00)
 """What stands for a byte of a file's name that is no text (PEP 383)."""
@@ -33,8 +35,8 @@ _HANDLER = "recoil.plain"
 def plain_letter(letter: str) -> str:
     r"""ASCII for a letter that a stream cannot encode: one that looks like it, else its escape.
 
-    >>> "".join(map(plain_letter, "p −0.5, η²┃é中"))
-    'p -0.5, eta2|e\\u4e2d'
+    >>> "".join(map(plain_letter, "p −0.5, η²┃é中, 80 °C"))
+    'p -0.5, eta2|e\\u4e2d, 80 degC'
     """
     if letter in _PLAIN:
         return _PLAIN[letter]
