@@ -15,6 +15,7 @@ from analysis.summary.sections import sections
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.experiments import direction_section
 from analysis.summary.sections.manuscript import manuscript_section
+from analysis.summary.sections.pictures import directions_picture
 from analysis.summary.sections.quality import quality_section
 from analysis.summary.sections.supplement import supplement_sections
 from experiments.clock import VirtualClock
@@ -212,7 +213,11 @@ def test_people_without_backward_trials_are_reported_with_what_they_have(
             felt = "forward" if code in codes else row["direction"]
             row.update(direction=felt, response="forward", correct=str(int(felt == "forward")))
         write_rows(trials_path(tmp_path / "results", code), rows)
-    (section,) = quality_section(reported(tmp_path / "results"))
+    report = reported(tmp_path / "results")
+    assert report.statistics.direction is not None
+    caption = directions_picture(report.statistics.direction).caption
+    assert f"Of {3 - len(codes)} of them there are backward shots by every method. " in caption
+    (section,) = quality_section(report)
     named = [code for code in ("P01", "P02", "P03") if code not in codes]
     told = "\n".join(section.items)
     assert (f"said forward in every trial (kept): {', '.join(named)}." in told) is bool(named)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
+
 from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.figures.shot import ShotPanel, figure_5
@@ -159,13 +161,21 @@ def directions_picture(found: DirectionStatistics) -> Picture:
     sensitive = any(found.sensitivity.values())
     caption = (
         f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. "
-        f"{_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
+        f"{_without_backward(found)}{_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
     )
     rates = "; ".join(_rates_words(found, method) for method in found.methods[:_SPELLED_OUT])
     rates += f"; and {len(found.methods) - _SPELLED_OUT} more methods" if has_many(found) else ""
     what = "mean correct rates" if found.n > 1 else "correct rates"
     alt = f"Dot plot of the {what} with everybody's values and a line at chance, 50 %. {rates}."
     return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
+
+
+def _without_backward(found: DirectionStatistics) -> str:
+    """How many have backward shots by every method, where that is not everybody."""
+    backward = found.backward.participants
+    own = np.array([backward.column(method, found.participants.codes) for method in found.methods])
+    whole = int(np.isfinite(own).all(axis=0).sum())
+    return "" if whole == found.n else f"Of {whole} of them there are backward shots by every method. "
 
 
 def _direction_crowd(n: int) -> str:
