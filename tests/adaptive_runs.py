@@ -21,6 +21,7 @@ from experiments.design.stimuli import stimuli_of
 from experiments.design.streams import Stream
 from experiments.live_run import LiveRun
 from experiments.record import storage
+from experiments.record.design_table import design_rows
 from experiments.record.journal import Contents, Journal, contents_of, read_journal
 from experiments.record.replay import RunPosition, replay
 from experiments.record.replay import history as told_by
@@ -35,6 +36,7 @@ from experiments.session.remarks import EntryCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import (
     STEP,
+    Answered,
     Ask,
     Failed,
     FireShot,
@@ -235,6 +237,37 @@ def check_ends(setup: Setup[DesignConfig], contents: Contents) -> None:
     told = told_by(contents)
     for number in {trial.track for trial in contents.plan.trials}:
         assert expected(setup, contents.plan, told, number) is None
+
+
+def check_rows(setup: Setup[DesignConfig], contents: Contents) -> int:
+    """Whenever a run stops, each row has the answers to the stimulus that it tells of, and no others; how many."""
+    checked, plan, design = 0, contents.plan, setup.config
+    for at, line in enumerate(contents.records):
+        if line.kind not in ("outcome", "remark"):
+            continue
+        told = told_by(replace(contents, records=contents.records[: at + 1]))
+        for trial, row in zip(plan.trials, design_rows(plan, told, design), strict=True):
+            for question in design.questions:
+                said = _said_of_the_last(told, trial, question)
+                assert row.get(question) == (said[0] if said else None)
+                checked += said is not None
+    return checked
+
+
+def _said_of_the_last(history: History, trial: Trial, question: str) -> tuple[AnswerValue] | None:
+    """What was said of the last stimulus of a trial that may have been felt, unless it was spoiled."""
+    own = [(step, word) for step, word in history if trial in (_about(step, word), getattr(word, "trial", None))]
+    last = max((at for at, (step, word) in enumerate(own) if _begins_anew(step, word, trial)), default=-1)
+    said = [word for step, word in own[last + 1 :] if _asked(step, word) == question]
+    values = [(word.value,) for word in said if isinstance(word, Answered | EntryCorrected)]
+    return values[-1] if values else None
+
+
+def _begins_anew(step: Step | None, word: Outcome | Remark, trial: Trial) -> bool:
+    if isinstance(word, Repeated):
+        return word.trial == trial
+    unfelt = isinstance(word, Failed | Interrupted) and not word.presented
+    return isinstance(step, FireShot) and step.trial == trial and step.interval == 0 and not unfelt
 
 
 def steps_with_history(contents: Contents) -> Iterator[tuple[FireShot, History]]:

@@ -26,6 +26,7 @@ from tests.adaptive_runs import (
     adaptive,
     check_ends,
     check_levels,
+    check_rows,
     cut_and_resumed,
     step_after_cut,
     step_after_that,
@@ -52,6 +53,13 @@ def test_after_corrections_and_repeats_the_next_level_is_as_if_the_answers_had_b
     kind: str, undone: dict[str, list[Contents]]
 ) -> None:
     assert sum(check_levels(SETUPS[kind], contents) for contents in undone[kind]) > 20
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_row_has_an_answer_to_another_stimulus_than_its_own_whenever_a_run_stops(
+    kind: str, undone: dict[str, list[Contents]]
+) -> None:
+    assert sum(check_rows(SETUPS[kind], contents) for contents in undone[kind]) > 200
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -151,7 +151,7 @@ def _shown(design: DesignConfig, events: TrialHistory) -> Row:
         row |= {"status": fired.motion}
     if events.at_edge:
         row |= {"flags": " ".join(filter(None, (str(row["flags"]), tables.AT_EDGE)))}
-    given = events.last(Answered)
+    given = next((word for _, word in reversed(events.counting) if isinstance(word, Answered)), None)
     if given is None or given.by != "participant" or given.response_time_s is None:
         return row
     if given.response_time_s >= ANTICIPATION_S:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -22,9 +22,10 @@ GrowingHistory = list[tuple[steps.Step | None, steps.Outcome | Remark]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialHistory:
-    """What the journal tells of one trial, in order, and whether it was asked to be repeated."""
+    """What the journal tells of one trial, in order, what of it counts, and whether it was asked to be repeated."""
 
-    items: list[tuple[steps.Step | None, steps.Outcome | Remark]]
+    items: GrowingHistory
+    counting: GrowingHistory
     repeated: bool
 
     @property
@@ -58,10 +59,10 @@ class TrialHistory:
         return next((step for step in done if isinstance(step, steps.FireShot | steps.Present)), None)
 
     def entered(self, question: str) -> list[steps.Answered | EntryCorrected]:
-        """What was answered to a question, and corrected, in order: the last counts."""
+        """What was answered to a question of the last presentation, and corrected, in order: the last counts."""
         return [
             word
-            for step, word in self.items
+            for step, word in self.counting
             if (isinstance(word, EntryCorrected) and word.question == question)
             or (isinstance(word, steps.Answered) and isinstance(step, Asking) and step.question == question)
         ]
@@ -75,12 +76,37 @@ class TrialHistory:
 def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHistory]:
     """What the journal tells, by trial."""
     repeated = {word.trial for _, word in history if isinstance(word, steps.Repeated)}
-    found = {trial: TrialHistory(items=[], repeated=trial in repeated) for trial in trials}
+    found = {trial: TrialHistory(items=[], counting=[], repeated=trial in repeated) for trial in trials}
     for step, word in history:
         trial = _trial(step, word)
         if trial is not None:
             found[trial].items.append((step, word))
+    for step, word in counting(history):
+        trial = _trial(step, word)
+        if trial is not None:
+            found[trial].counting.append((step, word))
     return found
+
+
+def counting(history: History) -> GrowingHistory:
+    """The history without what counts no more: what was felt and said of a trial before it was presented again.
+
+    Of one that was spoiled nothing counts from then on, also while it waits for its next presentation: no answer is
+    ever taken for one to a stimulus that it was not given to.
+    """
+    found, gone = GrowingHistory(), set[Trial]()
+    for step, word in reversed(history):
+        trial = _trial(step, word)
+        if trial not in gone or not isinstance(word, _OF_A_PRESENTATION):
+            found.append((step, word))
+        if isinstance(word, steps.Repeated):
+            gone.add(word.trial)
+        elif trial is not None and is_attempt(step, word):
+            gone.add(trial)
+    return found[::-1]
+
+
+_OF_A_PRESENTATION = (steps.Fired, steps.Presented, steps.Answered, EntryCorrected)
 
 
 def _trial(step: steps.Step | None, word: steps.Outcome | Remark) -> Trial | None:
@@ -109,12 +135,17 @@ def chosen_levels(history: History, trial: Trial) -> Condition:
 
 
 def entries(history: History, here: Trial) -> list[Asking]:
-    """What was entered in the set of a trial, as what asked for it, in order: what can be corrected.
+    """What was entered in the set of a trial and counts, as what asked for it, in order: what can be corrected.
 
     What is entered anew, because its trial was presented again, stands where it was entered first.
     """
-    found = (step for step, word in history if isinstance(step, Asking) and isinstance(word, steps.Answered))
-    return [step for step in dict.fromkeys(found) if of_one_set(step.trial, here)]
+    counts = set(_answers_asked(counting(history)))
+    return [step for step in dict.fromkeys(_answers_asked(history)) if step in counts and of_one_set(step.trial, here)]
+
+
+def _answers_asked(history: History) -> Iterator[Asking]:
+    """What asked for each answer."""
+    return (step for step, word in history if isinstance(step, Asking) and isinstance(word, steps.Answered))
 
 
 def asked_before(history: History, about: EntryCorrected) -> Asking | None:
@@ -126,7 +157,7 @@ def asked_before(history: History, about: EntryCorrected) -> Asking | None:
 
 def entered_value(history: History, asked: Asking) -> AnswerValue:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
-    said = [_value(step, word, asked) for step, word in history]
+    said = [_value(step, word, asked) for step, word in counting(history)]
     return next((one[0] for one in reversed(said) if one), None)
 
 
