@@ -413,7 +413,8 @@ def test_ratings_still_to_come_are_counted() -> None:
     assert day.left_s == pytest.approx(len(day.plan.trials) * PREFERENCE.config.rating_s)
     assert day.left_s > 0
     day.told.append((rate(day.plan.trials[0]), Answered(value=5.0, by="experimenter")))
-    assert day.left_s == pytest.approx((len(day.plan.trials) - 1) * PREFERENCE.config.rating_s)
+    questions = len(day.plan.trials) * len(PREFERENCE.config.asked_later)
+    assert day.left_s == pytest.approx((questions - 1) * PREFERENCE.config.question_s)
 
 
 def test_how_far_the_run_is_counts_what_was_felt_and_what_was_rated_where_all_is_rated_last() -> None:

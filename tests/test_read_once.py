@@ -51,7 +51,7 @@ def asked(study: StudyFolder, code: str, **more: Any) -> RunRequest:
 def reads(study: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """How often each file is read from now on, by its name."""
     counted: Counter[str] = Counter()
-    read, read_journal = Path.read_bytes, storage.read
+    read, read_journal = storage.read_whole, storage.read
 
     def counting(path: Path) -> bytes:
         counted[path.name] += 1
@@ -61,7 +61,7 @@ def reads(study: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         counted[path.name] += 1
         return read_journal(path, most, start)
 
-    monkeypatch.setattr(Path, "read_bytes", counting)
+    monkeypatch.setattr(storage, "read_whole", counting)
     monkeypatch.setattr(storage, "read", counting_journals)
     return counted
 

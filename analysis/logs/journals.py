@@ -12,7 +12,7 @@ from typing import Literal
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.words import first_few
-from experiments.rebuild import JOURNAL_NAME, misnamed, table
+from experiments.rebuild import JOURNAL_NAME, began_with, misnamed, table
 from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError
 from experiments.record.tables import FILE_SUFFIX, DataKind
@@ -93,7 +93,7 @@ def made_again(run: RunFile) -> bytes | BegunRun:
             return BegunRun(file=run, answered=0, planned=0)
         _refuse_other(run, contents)
         if not contents.finished:
-            done = len(answered(replay.history(contents)))
+            done = len(answered(replay.history(contents), began_with(contents.head).judgements))
             return BegunRun(file=run, answered=done, planned=len(contents.plan.trials), data=data_of(contents.head))
         return table(contents)
     except JournalError as error:

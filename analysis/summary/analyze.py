@@ -30,7 +30,7 @@ from analysis.summary.results import STATISTICS_FILE, RulesApplied, StudyStatist
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
 from analysis.summary.summary import summarize
-from analysis.summary.tables_out import TABLES, result_tables
+from analysis.summary.tables_out import TABLE_FILES, result_tables
 from device.words import first_few
 from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
@@ -107,7 +107,7 @@ def analyze(
     from analysis.summary.sections.sections import write_report  # noqa: PLC0415 - who writes none has no need of figures
 
     files = _loaded(request)
-    with placing.results_in(request.out, STATISTICS_FILE, TABLES) as part:
+    with placing.results_in(request.out, STATISTICS_FILE, TABLE_FILES) as part:
         logs = _usable(request, files, track)
         with progress("analyze", _PARTS) as tell:
             report, parts, edited = _analysis(request, files, logs, tell)

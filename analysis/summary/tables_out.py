@@ -28,7 +28,7 @@ MAX_NAME = 64
 _KEYS = [STUDY, "participant_id", "method"]
 
 
-TABLES = ("*_long.csv", "*_wide.csv")
+TABLE_FILES = ("*_long.csv", "*_wide.csv")
 """What the files of tables are called."""
 
 

@@ -94,12 +94,27 @@ class DesignConfig(Model):
     @property
     def rating_s(self) -> float:
         """Planned time of what is asked about a trial after its block."""
-        return self.question_s * sum(question.when == "block" for question in self.questions.values())
+        return self.question_s * len(self.asked_later)
 
     @property
-    def asks_later(self) -> bool:
-        """Whether something is asked about each trial after its block."""
-        return any(question.when == "block" for question in self.questions.values())
+    def asked_at_once(self) -> tuple[str, ...]:
+        """The questions about a trial when it was felt."""
+        return tuple(name for name, question in self.questions.items() if question.when == "trial")
+
+    @property
+    def asked_later(self) -> tuple[str, ...]:
+        """The questions about each trial after its block."""
+        return tuple(name for name, question in self.questions.items() if question.when == "block")
+
+    @property
+    def judged_later(self) -> tuple[str, ...]:
+        """Those after the block that take more than words."""
+        return tuple(name for name in self.asked_later if self.questions[name].kind != "text")
+
+    @property
+    def judgements(self) -> tuple[str, ...]:
+        """The questions that make a trial an answered one: words alone are no judgement, unless only they are asked."""
+        return tuple(name for name, one in self.questions.items() if one.kind != "text") or tuple(self.questions)
 
     @property
     def between(self) -> tuple[str, ...]:

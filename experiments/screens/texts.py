@@ -64,7 +64,7 @@ def track_text(plan: Plan, told: History, trial: Trial) -> str:
     return phrase(
         "Track {track}: {answered} of {at_most}{own} trials",
         track=trial.track,
-        answered=len(answered(told) & own),
+        answered=len(answered(told, ()) & own),
         at_most=_at_most(plan),
         own=len(own),
     )

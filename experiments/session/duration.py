@@ -73,8 +73,9 @@ class Ahead:
 def remaining_s(ahead: Ahead, timing: RunTiming) -> float:
     """Seconds still to go: trials left, breaks left, what is left of this one, and the ratings still to come."""
     design, planned = ahead.design, len(ahead.plan.trials)
-    left = planned - len(done(ahead.told))
-    ratings_s = max(0, planned - len(answered(ahead.told))) * design.rating_s
+    left = planned - len(done(ahead.told, design))
+    later = sum(planned - len(answered(ahead.told, (name,))) for name in design.asked_later)
+    ratings_s = later * design.question_s
     return float(left * timing.trial_s(design.trial_s) + _breaks_left_s(ahead) + ratings_s)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.session import steps
 from experiments.session.remarks import EntryCorrected, Remark
@@ -195,18 +196,32 @@ def _told_later(history: History) -> set[Trial]:
     }
 
 
-def done(history: History) -> set[Trial]:
-    """The trials that were answered, or felt until next."""
-    return set(_shown(history))
+def done(history: History, design: DesignConfig) -> set[Trial]:
+    """The trials that are over but for what is asked after their block: felt, and answered to all else."""
+    at_once = design.asked_at_once
+    return answered(history, at_once) if at_once else felt(history)
 
 
-def answered(history: History) -> set[Trial]:
-    """The trials that were judged, whatever became of the answer: words alone are no judgement."""
+def felt(history: History) -> set[Trial]:
+    """The trials whose stimulus is over: every interval of it, or all of a train."""
     return {
         step.trial
-        for step, word in history
-        if isinstance(step, steps.Ask | steps.Rate) and isinstance(word, steps.Answered)
+        for step, word in counting(history)
+        if isinstance(step, steps.Present | steps.FireShot)
+        and (isinstance(word, steps.Presented) or (isinstance(word, steps.Fired) and _is_last(step)))
     }
+
+
+def _is_last(step: steps.Step) -> bool:
+    return isinstance(step, steps.FireShot) and step.interval + 1 >= len(step.trial.intervals)
+
+
+def answered(history: History, questions: Collection[str]) -> set[Trial]:
+    """The trials with an answer that counts to each of some questions, also if it is that there is none."""
+    found: dict[Trial, set[str]] = {}
+    for asked in _answers_asked(counting(history)):
+        found.setdefault(asked.trial, set()).add(asked.question)
+    return {trial for trial, names in found.items() if names.issuperset(questions)}
 
 
 def _shown(history: History) -> list[Trial]:

@@ -348,15 +348,15 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
             f"{where.journal}: line 1: is of participant {plan.participant_id}, experiment {plan.experiment}; "
             "it was renamed or copied here, so put it back"
         )
-    head, told = contents.head, replay.history(contents)
+    head, told, design = contents.head, replay.history(contents), began_with(contents.head)
     state: RunState = "done" if contents.finished else "open elsewhere" if elsewhere else "in progress"
     return RunProgress(
         experiment=where.experiment,
         state="synthetic" if head.participant == "synthetic" and state != "open elsewhere" else state,
-        answered=len(answered(told)),
+        answered=len(answered(told, design.judgements)),
         planned=len(plan.trials),
         last_utc=contents.records[-1].utc,
-        methods=order_shown(began_with(head), plan),
+        methods=order_shown(design, plan),
         data=data_of(head),
         language="" if head.language is None else f"{head.language.code} ({head.language.name})",
     )

@@ -228,7 +228,7 @@ class RunSoFar:
     def done(self) -> int:
         """How many of the planned trials were judged, or felt until next."""
         planned = {_key(trial) for trial in self.plan.trials}
-        return len(planned & {_key(trial) for trial in done(self._told)})
+        return len(planned & {_key(trial) for trial in done(self._told, self.design)})
 
     @property
     def where(self) -> str:

@@ -14,7 +14,7 @@ from experiments.screens.console.view import About, Seen
 from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
-from experiments.session.history import History, answered, done, entries, of_one_set
+from experiments.session.history import History, answered, done, entries, felt, of_one_set
 from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
 from experiments.session.states import State
 from experiments.session.steps import Outcome, Step
@@ -34,12 +34,14 @@ def trials_done(seen: Seen) -> list[TrialCount]:
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
     """
-    felt, trials, here = done(seen.told), seen.about.plan.trials, seen.here
+    design, trials, here = seen.about.setup.config, seen.about.plan.trials, seen.here
     if seen.about.rated_last:
-        return [_count("felt", trials, felt), _count("rated", trials, answered(seen.told))]
+        rated = answered(seen.told, design.judged_later)
+        return [_count("felt", trials, felt(seen.told)), _count("rated", trials, rated)]
+    finished = done(seen.told, design)
     session = [trial for trial in trials if trial.session == here.session]
     parts = {"set": [trial for trial in session if of_one_set(trial, here)], "session": session, "experiment": trials}
-    return [_count(what, trials, felt) for what, trials in parts.items()]
+    return [_count(what, trials, finished) for what, trials in parts.items()]
 
 
 def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:

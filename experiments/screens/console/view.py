@@ -111,7 +111,7 @@ class About:
     @property
     def rated_last(self) -> bool:
         """Whether all stimuli of a block are rated after all were felt."""
-        return bool(self.setup.config.asks_later)
+        return bool(self.setup.config.judged_later)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
