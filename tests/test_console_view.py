@@ -31,6 +31,7 @@ from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Asking, Prepare, Present, Presented, Repeated, Rest
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
+from tests.designs import direction_with
 
 SAID = Answered(value="forward", by="experimenter", response_time_s=1.0, response_time_valid=False)
 SHOWN = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
@@ -446,3 +447,44 @@ def test_no_time_has_gone_by_before_the_run_begins() -> None:
     assert so_far.elapsed_s(5_000.0) == 0.0
     so_far.began_s = 5_000.0
     assert so_far.elapsed_s(5_030.0) == 30.0
+
+
+# several questions a trial
+
+
+@pytest.fixture
+def several() -> Setup[DesignConfig]:
+    """Sets of two trials with a direction and a rating at once, and words after the set."""
+    scale = {"kind": "rating", "text": "How strong?", "minimum": 0.0, "maximum": 10.0, "grain": 1.0}
+    words = {"kind": "text", "text": "What was it like?", "when": "block"}
+    return direction_with(methods=("vibration",), sets=2, repetitions=2, questions={"strength": scale, "words": words})
+
+
+def test_a_trial_is_done_when_all_that_is_asked_at_once_is_answered(several: Setup[DesignConfig]) -> None:
+    first, second, *_ = plan_of(several).trials
+    strength = replace(rate(first), question="strength", later=False)
+    said = (ask(first), SAID)
+    assert counted(seen(several, Position(step=strength), said))[0] == ("set", 0, 2)
+    told = (said, (strength, Answered(value=3.0, by="experimenter")))
+    assert counted(seen(several, Position(step=prepare(second)), *told))[0] == ("set", 1, 2)
+    spoiled = (*told, (prepare(second), Repeated(trial=first, reason="coughed")))
+    here = seen(several, Position(step=prepare(first)), *spoiled)
+    assert counted(here)[0] == ("set", 0, 2)
+    assert progress.answer_lines(here) == []
+
+
+def test_what_comes_next_in_a_set_with_questions_after_it_ends_with_the_set(several: Setup[DesignConfig]) -> None:
+    first, second, third, *_ = plan_of(several).trials
+    words = replace(describe(first), question="words")
+    break_s = "break of 20 s"
+    assert progress.coming(seen(several, Position(step=ask(second)))) == ["descriptions", break_s, shown_way(third)]
+    said = progress.coming(seen(several, Position(step=words)), count=4)
+    assert said[:3] == ["description: Feedback 2 of 2", break_s, shown_way(third)]
+    said = progress.coming(seen(several, Position(step=replace(words, trial=second))))
+    assert said[:2] == [break_s, shown_way(third)]
+    last = replace(words, trial=plan_of(several).trials[-1])
+    assert progress.coming(seen(several, Position(step=last))) == ["the end"]
+
+
+def shown_way(trial: Trial) -> str:
+    return trial.direction.upper()

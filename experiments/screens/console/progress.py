@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 from device import GunStatus
-from experiments.design.plan import Trial
+from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
 from experiments.screens.console.view import About, Seen
@@ -17,7 +17,7 @@ from experiments.session.duration import break_s
 from experiments.session.history import History, answered, done, entries, felt, of_one_set
 from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
 from experiments.session.states import State
-from experiments.session.steps import Outcome, Step
+from experiments.session.steps import Asking, Outcome, Step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,20 +57,56 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     step = seen.position.step
     if seen.ended is not None or seen.position.base is State.HALTED:
         return []
-    if isinstance(step, steps.Rate | steps.Describe) and step.later:
-        return _still_to_rate(seen, step)[:count]
-    if isinstance(step, steps.Close):
-        return [phrase("the end")]
-    trials, here = seen.about.plan.trials, seen.here
-    after = [trial for trial in trials[trials.index(here) + 1 :] if trial.track not in seen.over][:count]
-    lines: list[str] = []
+    return [phrase("the end")] if isinstance(step, steps.Close) else [*islice(_to_come(seen), count)]
+
+
+def _to_come(seen: Seen) -> Iterator[str]:
+    """All that is to do after the trial at hand."""
+    about, step, here = seen.about, seen.position.step, seen.here
+    resting, later = isinstance(step, steps.Rest), isinstance(step, Asking) and step.later
+    if isinstance(step, Asking) and step.later:
+        yield from _still_asked(about, step)
+        here = _set_of(about.plan, here)[-1]
+    trials = about.plan.trials
+    after = [trial for trial in trials[trials.index(here) + 1 :] if trial.track not in seen.over]
     for before, trial in pairwise([here, *after]):
-        if lines or not isinstance(step, steps.Rest):  # a break that is taken now is not still to come
-            lines += _break_between(seen.about, before, trial)
-        lines += _to_do(seen.about, before, trial)
-    if len(lines) < count and seen.about.rated_last:
-        lines.append(phrase("ratings and descriptions"))
-    return lines[:count] or [phrase("the end")]
+        at_hand = before == here
+        if not (of_one_set(before, trial) or (at_hand and (resting or later))):
+            yield from _asked_of_all(about)
+        if not (at_hand and resting):  # a break that is taken now is not still to come
+            yield from _break_between(about, before, trial)
+        yield from _to_do(about, before, trial)
+    if after or not later:
+        yield from _asked_of_all(about)
+    yield phrase("the end")
+
+
+def _set_of(plan: Plan, trial: Trial) -> list[Trial]:
+    return [one for one in plan.trials if of_one_set(one, trial)]
+
+
+def _still_asked(about: About, step: Asking) -> Iterator[str]:
+    """What is still asked about the trials of a set that were felt."""
+    design = about.setup.config
+    asked = [(trial, name) for trial in _set_of(about.plan, step.trial) for name in design.asked_later]
+    for trial, name in asked[asked.index((step.trial, step.question)) + 1 :]:
+        place, kind = texts.ordinal(about.plan, trial), design.questions[name].kind
+        if kind == "text":
+            same = trial == step.trial
+            yield phrase("its description") if same else phrase("description: {ordinal}", ordinal=place)
+        elif kind in ("choice", "yes-no"):
+            yield phrase("answer: {ordinal}", ordinal=place)
+        else:
+            yield phrase("rating: {ordinal}", ordinal=place)
+
+
+def _asked_of_all(about: About) -> Iterator[str]:
+    """What is asked about all trials of a set, once they were felt."""
+    design = about.setup.config
+    if design.judged_later and len(design.judged_later) < len(design.asked_later):
+        yield phrase("ratings and descriptions")
+    elif design.asked_later:
+        yield phrase("ratings") if design.judged_later else phrase("descriptions")
 
 
 def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
@@ -87,17 +123,6 @@ def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
 def _set_by_hand(about: About, trial: Trial) -> dict[str, str]:
     """What is set by hand for a trial, or for its first interval."""
     return dict(settings(about.setup.config, about.setup.gun, trial.levels_at(0) or trial.levels))
-
-
-def _still_to_rate(seen: Seen, step: steps.Rate | steps.Describe) -> list[str]:
-    plan = seen.about.plan
-    lines = [phrase("its description")] if isinstance(step, steps.Rate) else []
-    later = plan.trials[plan.trials.index(step.trial) + 1 :]
-    return [
-        *lines,
-        *(phrase("rating: {ordinal}", ordinal=texts.ordinal(plan, trial)) for trial in later),
-        phrase("the end"),
-    ]
 
 
 def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
