@@ -333,9 +333,10 @@ class PaperWindow:
         if self.live is None or self.controls is None:
             return
         drawn = self.live.position
-        if drawn.serial != self.controls.drawn.serial:
-            self.fields["number"] = self.fields["words"] = ""
+        changed = drawn.serial != self.controls.drawn.serial
         self.controls.draw(drawn)
+        if changed:
+            self.fields["number"] = self.fields["words"] = ""
         self._look(drawn)
         if drawn.serial not in self.painted_s:
             self.painted_s[drawn.serial] = self._clock.now()
@@ -416,6 +417,11 @@ class PaperWindow:
 
     def typed(self, field: TextField) -> str:
         return self.fields[field]
+
+    def take_typed(self) -> str:
+        typed = self.fields["number"]
+        self.fields["number"] = self.fields["words"] = ""
+        return typed
 
     def show_page(self, title: str, lines: list[str]) -> None:
         self.heard += [title, *lines]

@@ -303,6 +303,33 @@ def test_what_is_half_typed_is_kept_as_a_note_when_another_command_comes_and_q_c
     assert records(journal)[-1]["reason"] == "emergency stop"
 
 
+@pytest.mark.parametrize("how", ["emergency stop", "moved, and went on", "stop"])
+def test_an_answer_that_is_half_typed_is_kept_as_a_note_when_its_question_goes(
+    quick_configs: Path, tmp_path: Path, display: str, how: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    with AtConsole(run_words(quick_configs, "preference"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        screen.keys.type("7")
+        screen.keys.press("p", "Control_L")  # what is typed outlives a pause
+        screen.until(lambda look: look.state == "paused" and look.ready)
+        if how == "moved, and went on":
+            screen.keys.press("p")
+            screen.at("rating")
+            screen.keys.press("x", "Control_L")
+            screen.until(lambda look: look.state == "describing")
+            screen.keys.type("like a t")
+        if how == "emergency stop":
+            screen.keys.press("F12")
+            screen.at("halted")
+            screen.keys.press("q")
+        code, said = screen.close() if how == "emergency stop" else screen.stop()
+    assert code == 130, said
+    texts = [noted["text"] for noted in remarks(journal, "noted")]
+    assert texts == ["rating: 7", "description: like a t"][: 1 + (how == "moved, and went on")]
+
+
 def test_after_an_emergency_stop_a_run_goes_on_only_by_a_held_key_and_a_test_shot(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

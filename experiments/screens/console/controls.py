@@ -20,7 +20,7 @@ from experiments.session.events import Event, Hand, Press
 from experiments.session.history import chosen_levels, entered_value
 from experiments.session.judging import REARM_HELD_S
 from experiments.session.states import ARMED, EMERGENCY, Position, State
-from experiments.session.steps import Ask, Rate
+from experiments.session.steps import Ask, Asking, Rate, what
 from experiments.tasks.questions import AnswerValue, Choice
 
 TextField = Literal["line", "number", "words"]
@@ -41,6 +41,9 @@ class View(Protocol):
 
     def typed(self, field: TextField) -> str:
         """What is typed in a field."""
+
+    def take_typed(self) -> str:
+        """What was typed for the step at hand, its corrections apart, also before a pause; it is taken away."""
 
     def show_page(self, title: str, lines: list[str]) -> None:
         """Cover the run with a page of text."""
@@ -106,6 +109,8 @@ class Controls:
         """Another position is on the screen; a page that covers it goes when there is something new to do."""
         if position.state is not self.drawn.state:
             self.uncover()
+        if position.number != self.drawn.number or position.base is State.HALTED:
+            self._keep_typed()
         self.drawn = position
 
     # keys and buttons
@@ -268,9 +273,18 @@ class Controls:
         answer = events.Answer(response=response, at_s=press.at_s, by=self._hand, response_time_s=drawn_s)
         self._give(answer, response, press)
 
-    def _give(self, event: Event, said: AnswerValue, press: Press) -> None:
-        """Offer what was entered, or the same as a correction where one is open."""
-        self._offer(events.Correct(value=said) if self.drawn.state is State.CORRECTING else event, press)
+    def _give(self, event: Event, said: AnswerValue, press: Press) -> bool:
+        """Offer what was entered, or the same as a correction; whether it was taken as an answer."""
+        correcting = self.drawn.state is State.CORRECTING
+        verdict = self._live.offer(events.Correct(value=said) if correcting else event, press)
+        self._say(verdict)
+        return bool(verdict.taken) and not correcting
+
+    def _keep_typed(self) -> None:
+        """The step goes that something was typed for: what was not entered is kept as a note."""
+        step, typed = self.drawn.step, typed_line(self._view.take_typed())
+        if typed and isinstance(step, Asking):
+            self._live.offer(events.Note(text=f"{what(step)}: {typed}", trial=step.trial))
 
     def _drawn_s(self, response: str) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""
@@ -291,7 +305,8 @@ class Controls:
                 self._number(self._view.typed("number"), press)
             case "words":
                 text = typed_line(self._view.typed("words"))  # none is an answer as well
-                self._give(events.Description(text=text), text, press)
+                if self._give(events.Description(text=text), text, press):
+                    self._view.take_typed()
             case None if self.drawn.state is State.INFORMING:
                 self._offer(events.Told(), press)
             case None if self.drawn.state is State.CLOSING:
@@ -310,11 +325,11 @@ class Controls:
                 "Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum
             )
             self._view.say(said, "bad")
-        else:
-            self._rate(rating, press)
+        elif self._rate(rating, press):
+            self._view.take_typed()
 
-    def _rate(self, rating: float | None, press: Press) -> None:
-        self._give(events.Rating(rating=rating, by=self._hand), rating, press)
+    def _rate(self, rating: float | None, press: Press) -> bool:
+        return self._give(events.Rating(rating=rating, by=self._hand), rating, press)
 
     def entered_so_far(self) -> str:
         """What the open correction says now, to be typed over."""
@@ -377,6 +392,8 @@ class Controls:
         if event is None:
             self._view.say(FLAG_RULE, "bad")
             return False
+        if isinstance(event, events.Stop):
+            self._keep_typed()  # behind it nothing is written any more
         verdict = self._live.offer(event, press if isinstance(event, events.EndBreak | events.Repeat) else None)
         if verdict.taken:
             self._say(verdict)

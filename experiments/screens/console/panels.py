@@ -169,6 +169,16 @@ class TextFields:
         """What is typed in a field."""
         return self._fields[field].text()
 
+    def take_typed(self) -> str:
+        """What was typed for the step at hand, its corrections apart, also before a pause; it is taken away."""
+        self._keep(self._belongs)
+        found = [text for (name, _, entry), text in self._drafts.items() if name is not None and entry is None and text]
+        self._drafts.clear()
+        if self._belongs[2] is None:
+            self.rating.clear()
+            self.words.clear()
+        return found[-1] if found else ""
+
 
 LONGEST_S = 3.0
 """The height of the strip; longer times stand at its upper edge."""

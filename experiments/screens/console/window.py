@@ -355,6 +355,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         """What is typed in a field."""
         return self.fields.typed(field)
 
+    def take_typed(self) -> str:
+        """What was typed for the step at hand and not entered; it is taken away."""
+        return self.fields.take_typed()
+
     def show_page(self, title: str, lines: list[str]) -> None:
         """Cover the run with a page of text."""
         self.page.put(title, lines)
