@@ -140,6 +140,27 @@ def test_a_fault_is_named_with_its_key(claim: str, line: int, message: str, tmp_
     assert str(error.value).startswith(f"{tmp_path / 'some.toml'}:{line}: claims.0")
 
 
+@pytest.mark.parametrize(
+    ("claim", "said"),
+    [
+        ('kind = "percent"\npercent = "50%"\ncount = -1\nn = 2', "6: claims.0.count = -1: must be at least 0"),
+        ('kind = "percent"\npercent = "x%"\ncount = 1\nn = 2', "5: claims.0.percent = 'x%': 'x%' is no printed"),
+        ('kind = "percent"\ncount = 1\nn = 2', "1: claims.0.percent: is missing"),
+        ('kind = "percent"\npercent = "50%"\ncount = 1', "1: claims.0.n: is missing"),
+        ('kind = "df"\ndf = ["26"]\ncounts = [14]\ndesign = "within"', "7: claims.0.design = 'within': must be"),
+        ('kind = "p"\nstatistic = "t"\nvalue = "2"\ndf = ["1e400"]\np = ".1"', "7: claims.0.df.0 = '1e400'"),
+        ('kind = "df"\ndf = ["26"]\ncounts = [14]\ndesign = "paired"\nsize = 1', "8: claims.0.size = 1: unknown key"),
+    ],
+)
+def test_a_kind_that_is_called_like_one_of_its_keys_does_not_stand_for_it(
+    claim: str, said: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, f'[[claims]]\nplace = "I"\nquote = "x"\n{claim}')
+    with pytest.raises(ConfigError) as error:
+        load_paper_file(path)
+    assert str(error.value).startswith(f"{path}:{said}")
+
+
 NO_CLAIM = '[[claims]]\nplace = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2\n'
 TOO_LARGE = '[[claims]]\nplace = "III"\nquote = "y"\nkind = "repeated-f"\nF = "4.1"\nn = 1000000\nk = 3\n'
 A_CLAIM = '[[claims]]\nplace = "IV"\nquote = "z"\nkind = "grim"\nmean = "5.21"\nn = 28\n'

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 _LIKE, _MOST_FINDINGS = 5, 2_000
 _LONG_NUMBER = 1e15
@@ -45,7 +46,7 @@ def validation_text(
         if finding["type"] == "extra_forbidden":
             known = _known_keys(model, finding["loc"])
             finding["ctx"] = {"rule": f"{_UNKNOWN}; known are {', '.join(known)}" if known else _UNKNOWN}
-        found.setdefault(_place(finding, table), []).append(finding)
+        found.setdefault(_place(finding, model, table), []).append(finding)
     inner = {place[:length] for place in found for length in range(len(place))}
     said = [(place, findings) for place, findings in found.items() if not (place in inner and _follows(findings))]
     lines = [_finding(place, findings, source, text) for place, findings in _few(said)]
@@ -84,7 +85,7 @@ def _kind_inside(kind: Any, part: int | str) -> Any:
     """What a key, a place in a list or the name of one of several kinds leads to; `None` where that is no table."""
     inner = get_args(kind)
     if _is_table(kind):
-        return kind.model_fields[part].annotation if part in kind.model_fields else None
+        return _kind_of_field(kind.model_fields[part]) if part in kind.model_fields else None
     if get_origin(kind) is Annotated:
         return _kind_inside(inner[0], part)
     if get_origin(kind) is dict:
@@ -92,6 +93,17 @@ def _kind_inside(kind: Any, part: int | str) -> Any:
     if get_origin(kind) in (tuple, list):
         return inner[0]
     return next((one for one in inner if _is_table(one) and part in _tags(one)), None)
+
+
+def _kind_of_field(field: FieldInfo) -> Any:
+    """What stands in a field; of several kinds with the key that tells them apart, which a field keeps to itself."""
+    return Annotated[field.annotation, field] if field.discriminator else field.annotation
+
+
+def _told_apart_by(kind: Any) -> str | None:
+    """The key that says which of several kinds a table is, if the kind is such a choice."""
+    notes = get_args(kind)[1:] if get_origin(kind) is Annotated else ()
+    return next((note.discriminator for note in notes if isinstance(getattr(note, "discriminator", None), str)), None)
 
 
 def _is_table(kind: Any) -> bool:
@@ -113,26 +125,34 @@ def _follows(findings: Sequence[Any]) -> bool:
     return _all_of_kind(findings) or all(finding["type"] == "too_short" for finding in findings)
 
 
-def _place(finding: Any, table: dict[str, Any]) -> tuple[str, ...]:
+def _place(finding: Any, model: type[BaseModel], table: dict[str, Any]) -> tuple[str, ...]:
     """The keys of a finding as they stand in the file, without the names of the kinds that were tried."""
     keys: list[str] = []
     value: Any = table
+    kind: Any = model
     tagged = False
     for number, part in enumerate(finding["loc"], start=1):
         last = number == len(finding["loc"])
-        if isinstance(value, dict) and not tagged and not last and _is_tag(part, value):
+        if isinstance(value, dict) and not tagged and _is_tag(part, value, _told_apart_by(kind), last=last):
             tagged = True
         elif (isinstance(value, dict) and part in value) or (isinstance(value, list) and part in range(len(value))):
             value, tagged = value[part], False
             keys.append(str(part))
         elif last and finding["type"] == "missing":
             keys.append(str(part))
+        kind = _kind_inside(kind, part)
     return tuple(keys)
 
 
-def _is_tag(part: object, table: dict[str, Any]) -> bool:
-    """Whether a part of a place only says of which kind a table is, by its `law` or its `kind`."""
-    return part == table.get("law") or (part == table.get("kind") and part not in table)
+def _is_tag(part: object, table: dict[str, Any], told_apart_by: str | None, *, last: bool) -> bool:
+    """Whether a part of a place only says of which kind a table is.
+
+    A kind may be called as a key of its table is, such as "percent": where the model says which key tells the kinds
+    apart, the part in that place is the kind's name. Elsewhere it is one by the table's `law` or `kind`.
+    """
+    if told_apart_by is not None:
+        return part == table.get(told_apart_by)
+    return not last and (part == table.get("law") or (part == table.get("kind") and part not in table))
 
 
 def _finding(place: tuple[str, ...], findings: Sequence[Any], source: Path | str, text: str) -> str:
