@@ -181,6 +181,10 @@ def test_a_single_score_is_no_mean_of_scores() -> None:
         (["--mean", "0.35", "--sd", "0.18", "--n", "20", "--scale", "0-1"], 1, "it would have to be SD 0.489"),
         (["--mean", "3,47", "--n", "23"], 2, "--mean: '3,47' is no printed number (a comma? write '3.47')"),
         (["--mean", "3.47", "--n", "23", "--scale", "five"], 2, "--scale: 'five' is no scale"),
+        (["--mean", "3.45", "--n", "20", "--items", "0"], 2, "items at least 1, not 1 and 0"),
+        (["--mean", "3.45", "--n", "20", "--items", "-2"], 2, "items at least 1, not 1 and -2"),
+        (["--mean", "3.45", "--n", "20", "--grain", "0"], 2, "grain must be above 0 and items at least 1, not 0 and 1"),
+        (["--mean", "3.45", "--n", "0"], 2, "n must be at least 1, not 0"),
     ],
 )
 def test_one_line_judges_one_mean(recoil: Recoil, options: list[str], code: int, said: str) -> None:

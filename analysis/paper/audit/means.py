@@ -72,9 +72,10 @@ def scale_of(grain: str, low: str | None = None, high: str | None = None, items:
 
     `ValueError` if the grain is not above 0, or the ends are not whole steps apart or in the wrong order.
     """
-    step = read_printed(grain).value / items
+    step = read_printed(grain).value
     if step <= 0 or items < 1:
         raise ValueError(f"grain must be above 0 and items at least 1, not {grain} and {items}")
+    step /= items
     origin = read_printed(low).value if low is not None else Fraction(0)
     top = None if high is None else (read_printed(high).value - origin) / step
     if top is not None and (top.denominator != 1 or (low is not None and top < 0)):
