@@ -161,6 +161,16 @@ def test_a_kind_that_is_called_like_one_of_its_keys_does_not_stand_for_it(
     assert str(error.value).startswith(f"{path}:{said}")
 
 
+@pytest.mark.parametrize(("df", "said"), [("< 28", "'< 28' is a bound"), ("28%", "'28%' is a percentage")])
+@pytest.mark.parametrize("kind", ["p", "df"])
+def test_degrees_of_freedom_are_numbers_alone(kind: str, df: str, said: str, tmp_path: Path) -> None:
+    others = {"p": 'statistic = "t"\nvalue = "2.20"\np = ".036"', "df": 'design = "paired"\ncounts = [29]'}
+    path = written(tmp_path, f'[[claims]]\nplace = "I"\nquote = "x"\nkind = "{kind}"\ndf = ["{df}"]\n{others[kind]}')
+    with pytest.raises(ConfigError) as error:
+        load_paper_file(path)
+    assert str(error.value) == f"{path}:5: claims.0.df.0 = '{df}': {said} (rule: a number alone, as in '28')"
+
+
 NO_CLAIM = '[[claims]]\nplace = "II"\nquote = "x"\nkind = "percent"\npercent = "50%"\ncount = 3\nn = 2\n'
 TOO_LARGE = '[[claims]]\nplace = "III"\nquote = "y"\nkind = "repeated-f"\nF = "4.1"\nn = 1000000\nk = 3\n'
 A_CLAIM = '[[claims]]\nplace = "IV"\nquote = "z"\nkind = "grim"\nmean = "5.21"\nn = 28\n'

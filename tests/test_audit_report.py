@@ -14,6 +14,7 @@ from analysis.paper.audit.claims import AuditFinding
 from analysis.paper.audit.freedom import degrees_of_freedom
 from analysis.paper.audit.means import debit, grim, grimmer, percent_of_count
 from analysis.paper.audit.one_number import mean_and_sd
+from analysis.paper.audit.p_values import p_against_statistic
 from analysis.paper.audit.page import (
     ELSEWHERE,
     counts,
@@ -147,6 +148,12 @@ def test_a_tie_is_told_with_its_last_digit_and_the_convention() -> None:
     text = " ".join(sentences(of(percent_of_count("13%", 1, 8))))
     assert text.startswith("1 of 8, 13% is attainable: 1 of 8 is 12.5 %, printed half up.")
     assert sentences(of(percent_of_count("14%", 1, 8)))[0].startswith("1 of 8 people are 12.5 %, not 14%")
+
+
+def test_of_a_statistic_that_cannot_be_the_rule_is_told() -> None:
+    first, second = sentences(of(p_against_statistic("r", "1.2", ["10"], "< .001")))
+    assert first == "r(10) = 1.2, p < .001 is not attainable: a correlation lies between -1 and 1."
+    assert second.endswith("so it is misprinted, or rests on something that the paper does not state.")
 
 
 def test_of_a_mean_beyond_its_scale_that_is_said_first() -> None:

@@ -23,7 +23,7 @@ from analysis.paper.audit.lattices import (
     within_rows,
 )
 from analysis.paper.audit.means import grim, grimmer
-from analysis.paper.audit.p_values import p_against_statistic, p_bounds
+from analysis.paper.audit.p_values import Statistic, p_against_statistic, p_bounds
 from analysis.paper.audit.printed import (
     NONE_EXISTS,
     UNKNOWN,
@@ -141,6 +141,46 @@ def test_p_bounds_hold_the_value_and_are_narrow() -> None:
     assert p_bounds("r", Fraction(2), [Fraction(5)], "two-sided")[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("statistic", "value", "df", "p", "rule"),
+    [
+        ("F", "-2.20", ["2", "28"], ".13", "F is never below 0"),
+        ("F", "-0.01", ["2", "28"], "> .90", "F is never below 0"),
+        ("chi2", "-3.84", ["1"], ".05", "chi-squared is never below 0"),
+        ("Q", "-3.84", ["1"], ".05", "Q is never below 0"),
+        ("q", "-3.84", ["3", "26"], ".05", "q is never below 0"),
+        ("r", "1.2", ["10"], "< .001", "a correlation lies between -1 and 1"),
+        ("r", "-1.01", ["10"], "< .001", "a correlation lies between -1 and 1"),
+    ],
+)
+def test_a_statistic_that_cannot_be_is_not_attainable_whatever_its_p(
+    statistic: Statistic, value: str, df: list[str], p: str, rule: str
+) -> None:
+    result = p_against_statistic(statistic, value, df, p)
+    assert (result.verdict, result.reason) == ("not attainable", rule)
+
+
+@pytest.mark.parametrize(
+    ("statistic", "value", "df", "p"),
+    [
+        ("F", "-0.00", ["2", "28"], "> .90"),
+        ("chi2", "0.00", ["1"], "> .90"),
+        ("r", "1.00", ["10"], "< .001"),
+        ("r", "-1.0", ["10"], "< .001"),
+        ("t", "-2.20", ["28"], ".036"),
+    ],
+)
+def test_a_statistic_that_prints_so_can_be(statistic: Statistic, value: str, df: list[str], p: str) -> None:
+    assert p_against_statistic(statistic, value, df, p).verdict == "attainable"
+
+
+def test_sides_are_said_of_the_statistics_that_have_two() -> None:
+    assert p_against_statistic("t", "2.20", ["28"], ".036").reason.endswith(", two-sided")
+    assert p_against_statistic("t", "2.20", ["28"], ".018", sides="one-sided").reason.endswith(", one-sided")
+    for statistic, df in (("F", ["2", "28"]), ("chi2", ["1"]), ("Q", ["1"]), ("q", ["3", "26"])):
+        assert "sided" not in p_against_statistic(statistic, "2.20", df, ".13").reason  # type: ignore[arg-type]
+
+
 def test_totals_take_the_rounding_of_their_parts() -> None:
     assert total("10.0", [Term(times=["3.3"]), Term(times=["6.8"])]).verdict == "attainable"  # 3.25 + 6.75
     assert total("10.4", [Term(times=["3.3"]), Term(times=["6.8"])]).verdict == "not attainable"
@@ -170,6 +210,8 @@ def test_totals_take_the_rounding_of_their_parts() -> None:
         (lambda: binomial_p("0.1", 5, counts=[6]), "counts"),
         (lambda: p_against_statistic("t", "< 2", ["3"], ".1"), "not the bound"),
         (lambda: p_against_statistic("t", "2", [], ".1"), "degrees of freedom"),
+        (lambda: p_against_statistic("t", "2", ["< 28"], ".1"), "'< 28' is a bound"),
+        (lambda: p_against_statistic("t", "2", ["28%"], ".1"), "'28%' is a percentage"),
         (lambda: total("3", []), "at least one term"),
         (lambda: total("3", [Term(times=[1], over=[0])]), "may be 0"),
     ],

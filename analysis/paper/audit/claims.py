@@ -17,7 +17,14 @@ from analysis.paper.audit.binomial import binomial_p
 from analysis.paper.audit.freedom import Bound, ComparisonDesign, Term, degrees_of_freedom, total
 from analysis.paper.audit.means import check_count, debit, grim, grimmer, percent_of_count, scale_of
 from analysis.paper.audit.p_values import Sides, Statistic, p_against_statistic
-from analysis.paper.audit.printed import CheckResult, JudgedReadings, PrintedText, Rounding, read_printed
+from analysis.paper.audit.printed import (
+    CheckResult,
+    JudgedReadings,
+    PlainText,
+    PrintedText,
+    Rounding,
+    read_printed,
+)
 from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from analysis.paper.audit.variance_ratios import between_f, repeated_f
 from experiments.config.door import Model
@@ -110,7 +117,7 @@ class DfClaim(Claim):
     """Degrees of freedom of a design; see `degrees_of_freedom`."""
 
     kind: Literal["df"]
-    df: Annotated[list[PrintedText], Field(min_length=1)]
+    df: Annotated[list[PlainText], Field(min_length=1)]
     design: ComparisonDesign
     counts: Annotated[list[publication.AtLeastOne], Field(min_length=1, max_length=26)]
 
@@ -121,7 +128,7 @@ class PClaim(Claim):
     kind: Literal["p"]
     statistic: Statistic
     value: PrintedText
-    df: list[PrintedText] = Field(default_factory=list)
+    df: list[PlainText] = Field(default_factory=list)
     p: PrintedText
     sides: Sides = "two-sided"
 

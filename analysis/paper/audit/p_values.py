@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from analysis.paper.audit.printed import (
     PrintedNumber,
     Rounding,
     judge_readings,
+    read_plain,
     read_printed,
 )
 from analysis.stats.studentized_range import studentized_range_sf
@@ -32,6 +34,17 @@ RANGE_RELATIVE, RANGE_FAR, RANGE_ABSOLUTE = 1e-5, 1e-2, 1e-11
 _DF = {"t": 1, "F": 2, "chi2": 1, "r": 1, "z": 0, "Q": 1, "q": 2}
 SIDED = ("t", "r", "z")
 """Statistics with a sign: the others' p-values have one tail."""
+_ANY, _NOT_NEGATIVE = Interval(None, None, False, False), Interval(Fraction(0), None, True, False)
+_RANGES: Mapping[Statistic, tuple[Interval, str]] = MappingProxyType(
+    {
+        "F": (_NOT_NEGATIVE, "F is never below 0"),
+        "chi2": (_NOT_NEGATIVE, "chi-squared is never below 0"),
+        "Q": (_NOT_NEGATIVE, "Q is never below 0"),
+        "q": (_NOT_NEGATIVE, "q is never below 0"),
+        "r": (Interval(Fraction(-1), Fraction(1)), "a correlation lies between -1 and 1"),
+    }
+)
+"""The values that a statistic can have, with the rule in words; t and z can have any."""
 
 
 def check_df(statistic: Statistic, df: Sequence[Fraction]) -> None:
@@ -130,16 +143,22 @@ def p_against_statistic(
 
     `statistic`: t(df), F(df1, df2), chi2(df), r(df), z(), Q(df) of a meta-analysis, Tukey's q(k, df); all values that
     print as `value` are taken, and p falls as they rise. Reading: the other number of sides (t, r, z).
+    "not attainable" too where nothing that the statistic can be prints as `value`: a correlation of 1.2, an F below 0.
     "undecided" within the numerical margin of the tail's bounds. `ValueError`: text that is no number, a bound as the
-    statistic's own value, wrong degrees of freedom. Source: Nuijten et al. 2016, Behavior Research Methods 48, 1205.
+    statistic's own value, degrees of freedom that are wrong, a bound or a percentage.
+    Source: Nuijten et al. 2016, Behavior Research Methods 48, 1205.
 
     >>> p_against_statistic("t", "2.20", ["28"], ".036").verdict
     'attainable'
     """
-    number, printed, freedom = read_printed(value), read_printed(p), [read_printed(text).value for text in df]
+    number, printed, freedom = read_printed(value), read_printed(p), [read_plain(text).value for text in df]
     check_df(statistic, freedom)
     if number.relation != "=":
         raise ValueError(f"the statistic must be a number, not the bound {number.text}")
+    shown = f"{statistic}({', '.join(df)}) = {number.text}, p {_shown(printed)}"
+    allowed, rule = _RANGES.get(statistic, (_ANY, ""))
+    if not allowed.meets(number.interval(Rounding.ANY)):
+        return _never(shown, rule)
 
     def attempt(sides: Sides, rounding: Rounding) -> DataExistence:
         return _fitting(printed.interval(rounding), *p_range(statistic, number.interval(rounding), freedom, sides))
@@ -150,15 +169,21 @@ def p_against_statistic(
     outer, _ = p_range(statistic, number.interval(Rounding.HALF_UP), freedom, sides)
     return CheckResult(
         check="p against statistic",
-        printed=f"{statistic}({', '.join(df)}) = {number.text}, p {_shown(printed)}",
+        printed=shown,
         judged=judged,
-        reason=f"{statistic} = {number.text} means p in {_small(outer)}, {sides}",
+        reason=f"{statistic} = {number.text} means p in {_small(outer)}{f', {sides}' if statistic in SIDED else ''}",
         source=_SOURCE,
         below=outer.low,
         above=outer.high,
         contradicts=() if judged.verdict == "attainable" else (f"{statistic} = {number.text}", f"p {_shown(printed)}"),
         numbers=(("p of the statistic", _small(outer)),),
     )
+
+
+def _never(printed: str, rule: str) -> CheckResult:
+    """The result for a statistic that has no such value, whatever its p."""
+    judged = judge_readings(lambda _: NONE_EXISTS)
+    return CheckResult(check="p against statistic", printed=printed, judged=judged, reason=rule, source=_SOURCE)
 
 
 def _fitting(claimed: Interval, outer: Interval, inner: Interval | None) -> DataExistence:

@@ -206,9 +206,10 @@ def _not_attainable(finding: AuditFinding) -> tuple[str, str]:
     if result.check == "percent of count":
         return f"{_refused(result)}.", _percentage_rescue(result)
     against = " and ".join(result.contradicts)
+    follows = f"it cannot stand beside {against}: one of them is misprinted" if against else "it is misprinted"
     return f"{_refused(result)}.", (
-        f"No reading that was tried rescues it ({_tried(result)}), so it cannot stand beside {against}: one of them is "
-        "misprinted, or rests on something that the paper does not state."
+        f"No reading that was tried rescues it ({_tried(result)}), so {follows}, or rests on something that the paper "
+        "does not state."
     )
 
 

@@ -145,6 +145,19 @@ def read_printed(text: str | int) -> PrintedNumber:
     return PrintedNumber(str(text).strip(), _RELATIONS[relation], -value if sign in {"-", "−"} else value, unit)
 
 
+def read_plain(text: str) -> PrintedNumber:
+    """A printed number that stands for itself; `ValueError` for a bound and for a percentage too.
+
+    >>> read_plain("26.4").value
+    Fraction(132, 5)
+    """
+    number = read_printed(text)
+    if number.relation != "=" or "%" in number.text:
+        what = "a percentage" if number.relation == "=" else "a bound"
+        raise ValueError(f"{number.text!r} is {what} (rule: a number alone, as in '28')")
+    return number
+
+
 def _rule(text: str) -> str:
     if len(text) > _LONGEST:
         return f"rule: at most {_LONGEST} characters, not {len(text)}"
@@ -169,8 +182,15 @@ def _is_printed(text: str) -> str:
     return text
 
 
+def _is_plain(text: str) -> str:
+    read_plain(text)
+    return text
+
+
 PrintedText = Annotated[str, BeforeValidator(_quoted), AfterValidator(_is_printed)]
 """A number or a bound as printed: "28.45", ".205", "< .001", "64.3%"."""
+PlainText = Annotated[str, BeforeValidator(_quoted), AfterValidator(_is_plain)]
+"""A number as printed that is neither a bound nor a percentage, such as degrees of freedom: "28", "26.4"."""
 
 
 def _positive_interval(value: Fraction, unit: Fraction, digits: int, rounding: Rounding) -> Interval:
