@@ -156,6 +156,29 @@ def test_of_a_statistic_that_cannot_be_the_rule_is_told() -> None:
     assert second.endswith("so it is misprinted, or rests on something that the paper does not state.")
 
 
+@pytest.mark.parametrize(
+    ("mean", "sd", "n", "ones"),
+    [
+        (".86", ".348", 150, "ones among the 150: 129, or 130 by truncation."),
+        ("0.5", "0.51", 20, ": 10, or 9 by rounding half up, or 11 by rounding half down or truncation."),
+        ("0.35", "0.49", 20, "ones among the 20: 7."),
+    ],
+)
+def test_the_ones_that_print_a_mean_are_told_with_the_rounding_they_need(mean: str, sd: str, n: int, ones: str) -> None:
+    """129 / 150 = 0.86 and 130 / 150 = 0.8667; 9, 10 and 11 of 20 are 0.45, 0.5 and 0.55."""
+    assert sentences(of(debit(mean, sd, n)))[0].endswith(ones)
+
+
+def test_the_nearest_sd_is_that_of_ones_that_print_the_mean_as_ordinarily_rounded() -> None:
+    """sqrt(129 * 21 / (150 * 149)) = 0.3481; 130 ones, which print as .87, would have 0.3411."""
+    assert nearest_text(debit(".86", ".100", 150)) == "SD 0.3481"
+
+
+def test_the_counts_that_print_a_percentage_are_told_with_the_rounding_they_need() -> None:
+    first = sentences(of(percent_of_count("86%", 100, 150)))[0]
+    assert first == "100 of 150 people are 67 %, not 86%; that is the percentage of 129, or 130 by truncation."
+
+
 def test_of_a_mean_beyond_its_scale_that_is_said_first() -> None:
     found = mean_and_sd("7.2", 20, "1.1", "1-5")
     assert found.exceptions

@@ -21,6 +21,7 @@ from analysis.paper.audit.lattices import (
 from analysis.paper.audit.printed import (
     NONE_EXISTS,
     ORDINARY,
+    OTHER,
     UNKNOWN,
     Attempt,
     CheckResult,
@@ -129,6 +130,29 @@ def _mean_data(printed: PrintedNumber, n: int, scale: AnswerScale, rounding: Rou
     return DataExistence(True, even_spread(middle(sums), n, scale)) if sums else NONE_EXISTS
 
 
+def _ordinary_sums(printed: PrintedNumber, n: int, scale: AnswerScale) -> range:
+    """The sums of n values whose mean prints so, a tie rounded half up or half to even."""
+    found = [sums for sums in (scale.sums(printed.interval(rounding), n) for rounding in ORDINARY) if sums]
+    return range(min(one.start for one in found), max(one.stop for one in found)) if found else range(0)
+
+
+def _sums_by_rounding(printed: PrintedNumber, n: int, scale: AnswerScale) -> str:
+    """The sums of n values whose mean prints so however a tie falls, then those that one rounding gives, by its name.
+
+    >>> _sums_by_rounding(read_printed("0.86"), 150, AnswerScale(Fraction(1), low=0, high=1))
+    '129, or 130 by truncation'
+    """
+    up, even = (scale.sums(printed.interval(rounding), n) for rounding in ORDINARY)
+    both = range(max(up.start, even.start), min(up.stop, even.stop))
+    names = dict[str, list[str]]()
+    for rounding in (*ORDINARY, *OTHER):
+        more = [one for one in scale.sums(printed.interval(rounding), n) if one not in both]
+        if more:
+            names.setdefault(listed(more), []).append(rounding)
+    others = (f"{more} by {' or '.join(roundings)}" for more, roundings in names.items())
+    return ", or ".join([*([listed(both)] if both else []), *others])
+
+
 def even_spread(total: int, n: int, scale: AnswerScale) -> Witness:
     """So many scores with the sum `total`, as equal as can be."""
     base, more = divmod(total, n)
@@ -170,7 +194,7 @@ def percent_of_count(percent: str, count: int, n: int) -> CheckResult:
         lambda base: _share_attempt(printed, count, base),
     )
     judged = judge_readings(_share_attempt(printed, count, n), others)
-    fitting = AnswerScale(Fraction(1), low=0, high=1).sums(printed.interval(Rounding.ANY), n)
+    fitting = _sums_by_rounding(printed, n, AnswerScale(Fraction(1), low=0, high=1))
     below, above = nearest(printed.value, Fraction(1, n), Fraction(0), (0, n))
     return CheckResult(
         check="percent of count",
@@ -182,7 +206,7 @@ def percent_of_count(percent: str, count: int, n: int) -> CheckResult:
         below=below,
         above=above,
         contradicts=() if judged.verdict == "attainable" else (f"count {count}", f"n = {n}"),
-        numbers=((f"counts of {n} that print {printed.text}", listed(fitting) or "none"),),
+        numbers=((f"counts of {n} that print {printed.text}", fitting or "none"),),
     )
 
 
@@ -360,10 +384,9 @@ def debit(mean: str, sd: str, n: int) -> CheckResult:
     plain, *others = ((name, partial(_binary_data, means, spread, n, by(n))) for name, by in DIVISORS)
     judged = judge_readings(plain[1], others)
     scale = AnswerScale(Fraction(1), low=0, high=1)
-    ones = scale.sums(means.interval(Rounding.ANY), n)
     no_mean = _no_mean(means, n, scale)
-    below, above = (None, None) if no_mean else _nearest_variances(ones, spread.value**2, n)
-    fixed = f"the mean fixes the SD of answers of 0 and 1, here with {listed(ones) or 'no whole number of'} ones"
+    below, above = (None, None) if no_mean else _nearest_variances(_ordinary_sums(means, n, scale), spread.value**2, n)
+    fixed = f"the mean fixes the SD of answers of 0 and 1; ones among the {n}: {_sums_by_rounding(means, n, scale)}"
     return CheckResult(
         check="debit",
         printed=f"M = {means.text}, SD = {spread.text}",
