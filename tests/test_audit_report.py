@@ -190,6 +190,7 @@ def test_of_a_mean_beyond_its_scale_that_is_said_first() -> None:
     ("given", "said"),
     [
         (("3.2", 20, "1.1", "5-1"), "--scale: 5-1 begins with its upper end"),
+        (("3.2", 20, "1.1", "1-1"), r"--scale: 1-1 has the same end twice \(rule: two ends that differ, the lower"),
         (("3.2", 20, "-1.1", "1-5"), "--sd: -1.1 is below 0"),
         (("3", 1, "0.5", "1-5"), "--sd: one score has no standard deviation"),
     ],

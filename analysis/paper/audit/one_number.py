@@ -95,8 +95,10 @@ def _ends(scale: str | None) -> tuple[str | None, str | None]:
         raise ConfigError(f"--scale: {scale[:40]!r} is no scale (rule: its two ends, as 1-5 or 0-100)")
     for end in found.groups():
         _check("scale", end)
-    if read_printed(found[1]).value >= read_printed(found[2]).value:
-        raise ConfigError(f"--scale: {scale} begins with its upper end (rule: the lower one first, as 1-5)")
+    low, high = (read_printed(end).value for end in found.groups())
+    if low >= high:
+        said = "has the same end twice" if low == high else "begins with its upper end"
+        raise ConfigError(f"--scale: {scale} {said} (rule: two ends that differ, the lower one first, as 1-5)")
     return found[1], found[2]
 
 
