@@ -200,6 +200,15 @@ def test_what_no_data_can_have_is_refused_by_its_option(given: tuple[str, int, s
         mean_and_sd(*given)
 
 
+def test_one_number_is_one_number() -> None:
+    assert "\n1 number: 1 attainable." in findings_text([of(grim("5.21", 28))])
+
+
+def test_a_small_step_is_shown_and_not_rounded_to_none() -> None:
+    said = mean_and_sd("3.2", 1_000_000, grain="0.01").as_text()
+    assert "means of 1000000 scores in steps of 0.01 lie 0.00000001 apart" in said
+
+
 def test_a_single_score_is_no_mean_of_scores() -> None:
     assert "a single score comes in steps of 1" in mean_and_sd("3.2", 1).as_text()
 
@@ -215,6 +224,7 @@ def test_a_single_score_is_no_mean_of_scores() -> None:
         (["--mean", "3.45", "--n", "20", "--items", "0"], 2, "items at least 1, not 1 and 0"),
         (["--mean", "3.45", "--n", "20", "--items", "-2"], 2, "items at least 1, not 1 and -2"),
         (["--mean", "3.45", "--n", "20", "--grain", "0"], 2, "grain must be above 0 and items at least 1, not 0 and 1"),
+        (["--mean", "3.45", "--n", "20", "--items", "9" * 50], 2, "items must be at most 1,000,000"),
         (["--mean", "3.45", "--n", "0"], 2, "n must be at least 1, not 0"),
     ],
 )

@@ -71,11 +71,13 @@ class AnswerScale:
 def scale_of(grain: str, low: str | None = None, high: str | None = None, items: int = 1) -> AnswerScale:
     """A scale in steps of `grain` from `low` to `high`, a score being the mean of `items` answers.
 
-    `ValueError` if the grain is not above 0, or the ends are not whole steps apart or in the wrong order.
+    `ValueError` if the grain is not above 0, items are below 1 or above what can be checked, or the ends are not whole
+    steps apart or in the wrong order.
     """
     step = read_printed(grain).value
     if step <= 0 or items < 1:
         raise ValueError(f"grain must be above 0 and items at least 1, not {grain} and {items}")
+    check_count(items, "items")
     step /= items
     origin = read_printed(low).value if low is not None else Fraction(0)
     top = None if high is None else (read_printed(high).value - origin) / step
@@ -115,8 +117,17 @@ def grim(
 
 def _apart(n: int, scale: AnswerScale) -> str:
     if n == 1:
-        return f"a single score comes in steps of {decimal(scale.grain)}"
-    return f"means of {n} scores in steps of {decimal(scale.grain)} lie {decimal(scale.grain / n)} apart"
+        return f"a single score comes in steps of {_step(scale.grain)}"
+    return f"means of {n} scores in steps of {_step(scale.grain)} lie {_step(scale.grain / n)} apart"
+
+
+def _step(value: Fraction) -> str:
+    """A distance for a report: a small one to as many decimals as show it.
+
+    >>> _step(Fraction(1, 150)), _step(Fraction(1, 10**8))
+    ('0.006667', '0.00000001')
+    """
+    return decimal(value, max(6, len(str(value.denominator // value.numerator)) + 1))
 
 
 def check_count(n: int, name: str = "n") -> None:
@@ -255,7 +266,7 @@ def grimmer(
     judged = judge_readings(plain[1], others)
     no_mean = _no_mean(means, n, scale)
     below, above = (None, None) if no_mean else _nearest_spreads(means, spread, n, scale)
-    steps = f"{n} scores in steps of {decimal(scale.grain)} with one mean have sums of squares 2 steps apart"
+    steps = f"{n} scores in steps of {_step(scale.grain)} with one mean have sums of squares 2 steps apart"
     return CheckResult(
         check="grimmer",
         printed=f"M = {means.text}, SD = {spread.text}",
@@ -276,9 +287,7 @@ def _no_mean(means: PrintedNumber, n: int, scale: AnswerScale) -> str:
     sides = nearest(means.value, scale.grain / n, scale.origin, scale.ends(n))
     digits = max(0, -floor(log10(means.unit))) + 1
     shown = " and ".join(decimal(value, digits) for value in sides if value is not None)
-    return (
-        f"no {n} scores in steps of {decimal(scale.grain)} have this mean, whatever their SD; the nearest are {shown}"
-    )
+    return f"no {n} scores in steps of {_step(scale.grain)} have this mean, whatever their SD; the nearest are {shown}"
 
 
 def _spread_attempt(means: PrintedNumber, spread: PrintedNumber, n: int, scale: AnswerScale, divisor: int) -> Attempt:

@@ -38,12 +38,16 @@ def sections(findings: Sequence[AuditFinding], origin: Sequence[tuple[str, str]]
 
 def _summary(findings: Sequence[AuditFinding]) -> Section:
     rows = tuple((verdict, str(count), _MEANING[verdict]) for verdict, count in counts(findings).items() if count)
-    caption = f"{len(findings)} numbers, each with its verdict"
+    caption = f"{_how_many(findings)}, each with its verdict"
     return Section(
         title="Verdicts",
         paragraphs=(FAIRNESS,),
         tables=(Table(caption=caption, header=("Verdict", "Numbers", "What it means"), rows=rows),),
     )
+
+
+def _how_many(findings: Sequence[AuditFinding]) -> str:
+    return f"{len(findings)} number{'' if len(findings) == 1 else 's'}"
 
 
 _MEANING = {
@@ -136,7 +140,7 @@ def findings_text(findings: Sequence[AuditFinding]) -> str:
     ]
     asked = [f"{f.place}, “{f.quote}”: {' '.join(sentences(f))}" for f in findings if f.result.verdict in _IN_FULL]
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts(findings).items() if count)
-    return "\n".join([*lines, "", f"{len(findings)} numbers: {told or 'none'}.", *(f"\n{text}" for text in asked)])
+    return "\n".join([*lines, "", f"{_how_many(findings)}: {told or 'none'}.", *(f"\n{text}" for text in asked)])
 
 
 def cut(text: str, most: int) -> str:
