@@ -179,6 +179,11 @@ def test_the_counts_that_print_a_percentage_are_told_with_the_rounding_they_need
     assert first == "100 of 150 people are 67 %, not 86%; that is the percentage of 129, or 130 by truncation."
 
 
+def test_the_counts_that_give_a_p_are_told_with_the_rounding_they_need() -> None:
+    """By scipy, binomtest(15, 40) has p = 0.154 and binomtest(16, 40) p = 0.268."""
+    assert "The counts of 40 that give p: 15, 25, or 16, 24 by truncation." in sentences(of(binomial_p(".2", 40)))
+
+
 def test_of_a_mean_beyond_its_scale_that_is_said_first() -> None:
     found = mean_and_sd("7.2", 20, "1.1", "1-5")
     assert found.exceptions

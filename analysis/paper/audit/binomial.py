@@ -21,7 +21,6 @@ import scipy
 from analysis.paper.audit.means import check_count
 from analysis.paper.audit.p_values import ABSOLUTE, RELATIVE
 from analysis.paper.audit.printed import (
-    LISTED_AT_MOST,
     NONE_EXISTS,
     UNKNOWN,
     CheckResult,
@@ -32,6 +31,7 @@ from analysis.paper.audit.printed import (
     decimal,
     judge_readings,
     listed,
+    listed_by_rounding,
     read_printed,
 )
 
@@ -173,7 +173,8 @@ def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | N
     judged = judge_readings(
         partial(plain.data, printed), [(one.rule.name, partial(one.data, printed)) for one in others]
     )
-    fitting = _Asked(RULES[0], trials, range(n + 1)).giving(printed.interval(Rounding.ANY))
+    every = _Asked(RULES[0], trials, range(n + 1))
+    fitting = listed_by_rounding(lambda rounding: every.giving(printed.interval(rounding))) or "none"
     below, above = plain.nearest(printed.value)
     shown = f"0 to {n}" if counts is None else listed(asked)
     return CheckResult(
@@ -224,15 +225,14 @@ class _Asked:
         first = bisect_left(slope, 0, key=lambda k: interval.side(self._p(k)[1]))
         return slope[first : bisect_right(slope, 0, key=lambda k: interval.side(self._p(k)[0]))]
 
-    def giving(self, interval: Interval) -> str:
-        """The counts whose p certainly lies inside, the first of them."""
-        found = []
+    def giving(self, interval: Interval) -> list[int]:
+        """The counts whose p certainly lies inside, the lowest first."""
+        found = list[int]()
         for slope in self._slopes:
             first = bisect_left(slope, 0, key=lambda k: interval.side(self._p(k)[0]))
             held = slope[first : bisect_right(slope, 0, key=lambda k: interval.side(self._p(k)[1]))]
-            found.append(held[::-1] if held and held[0] > held[-1] else held)
-        rising, falling = found
-        return listed([*rising[:LISTED_AT_MOST], *falling[:LISTED_AT_MOST]], count=len(rising) + len(falling)) or "none"
+            found += held
+        return sorted(found)
 
     def nearest(self, value: Fraction) -> tuple[Fraction | None, Fraction | None]:
         """The nearest p-values below and above, or `value` itself."""

@@ -21,7 +21,6 @@ from analysis.paper.audit.lattices import (
 from analysis.paper.audit.printed import (
     NONE_EXISTS,
     ORDINARY,
-    OTHER,
     UNKNOWN,
     Attempt,
     CheckResult,
@@ -33,7 +32,7 @@ from analysis.paper.audit.printed import (
     decimal,
     family,
     judge_readings,
-    listed,
+    listed_by_rounding,
     middle,
     read_printed,
 )
@@ -148,20 +147,12 @@ def _ordinary_sums(printed: PrintedNumber, n: int, scale: AnswerScale) -> range:
 
 
 def _sums_by_rounding(printed: PrintedNumber, n: int, scale: AnswerScale) -> str:
-    """The sums of n values whose mean prints so however a tie falls, then those that one rounding gives, by its name.
+    """The sums of n values whose mean prints so, with the rounding they need; empty if there are none.
 
     >>> _sums_by_rounding(read_printed("0.86"), 150, AnswerScale(Fraction(1), low=0, high=1))
     '129, or 130 by truncation'
     """
-    up, even = (scale.sums(printed.interval(rounding), n) for rounding in ORDINARY)
-    both = range(max(up.start, even.start), min(up.stop, even.stop))
-    names = dict[str, list[str]]()
-    for rounding in (*ORDINARY, *OTHER):
-        more = [one for one in scale.sums(printed.interval(rounding), n) if one not in both]
-        if more:
-            names.setdefault(listed(more), []).append(rounding)
-    others = (f"{more} by {' or '.join(roundings)}" for more, roundings in names.items())
-    return ", or ".join([*([listed(both)] if both else []), *others])
+    return listed_by_rounding(lambda rounding: scale.sums(printed.interval(rounding), n))
 
 
 def even_spread(total: int, n: int, scale: AnswerScale) -> Witness:

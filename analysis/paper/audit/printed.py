@@ -383,8 +383,25 @@ LISTED_AT_MOST = 12
 """Values of which a report names all."""
 
 
-def listed(values: Sequence[object], *, count: int | None = None) -> str:
-    """Values for a report, the first of them; `count` says how many there are where `values` has only the first."""
+def listed(values: Sequence[object]) -> str:
+    """Values for a report: the first of them, and how many more there are."""
     shown = values[:LISTED_AT_MOST]
-    more = (len(values) if count is None else count) - len(shown)
+    more = len(values) - len(shown)
     return ", ".join(map(str, shown)) + (f" and {more} more" if more > 0 else "")
+
+
+def listed_by_rounding(values: Callable[[Rounding], Sequence[int]]) -> str:
+    """The numbers that print so under both ordinary roundings, then those that need one rounding, with its name.
+
+    >>> listed_by_rounding({**dict.fromkeys(Rounding, [9]), Rounding.TRUNCATION: [9, 10]}.__getitem__)
+    '9, or 10 by truncation'
+    """
+    found = {rounding: values(rounding) for rounding in (*ORDINARY, *OTHER)}
+    both = set[int].intersection(*(set(found[rounding]) for rounding in ORDINARY))
+    names = dict[str, list[str]]()
+    for rounding, fitting in found.items():
+        more = [value for value in fitting if value not in both]
+        if more:
+            names.setdefault(listed(more), []).append(rounding)
+    others = (f"{more} by {' or '.join(roundings)}" for more, roundings in names.items())
+    return ", or ".join([*([listed(sorted(both))] if both else []), *others])
