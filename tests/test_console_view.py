@@ -24,7 +24,7 @@ from experiments.load import load_setup
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.progress import trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
-from experiments.screens.texts import ends_text
+from experiments.screens.texts import ends_text, typed_rating
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
@@ -447,6 +447,21 @@ def test_no_time_has_gone_by_before_the_run_begins() -> None:
     assert so_far.elapsed_s(5_000.0) == 0.0
     so_far.began_s = 5_000.0
     assert so_far.elapsed_s(5_030.0) == 30.0
+
+
+@pytest.mark.parametrize(
+    ("grain", "typed", "meant"),
+    [
+        *((0.1, "7,3", 7.3), (0.5, "7.5", 7.5), (1.0, "10", 10.0), (0.0, "7.123", 7.123), (0.1, " 0 ", 0.0)),
+        (1.0, "2.5", "It goes in steps of 1: type 2 or 3."),
+        (0.5, "7.3", "It goes in steps of 0.5: type 7 or 7.5."),
+        (1.0, "9.51", "It goes in steps of 1: type 9 or 10."),
+        *((0.1, typed, "Not a rating: type a number from 0 to 10.") for typed in ("11", "-1", "nan", "1_0", "", "1e")),
+    ],
+)
+def test_a_rating_is_taken_as_it_was_typed_or_not_at_all(grain: float, typed: str, meant: float | str) -> None:
+    scale = replace(rate(plan_of(PREFERENCE).trials[0]), grain=grain)
+    assert typed_rating(typed, scale) == meant
 
 
 # several questions a trial

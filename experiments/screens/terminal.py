@@ -348,8 +348,7 @@ def _typed_rating(line: str, asked: Rate) -> float | str | None:
     """The rating that a line says, `None` for no answer; or what to say if it is none."""
     if line.lower() == "none":
         return None
-    rating = texts.typed_number(line, asked.minimum, asked.maximum)
-    return f"Not a rating: type a number from {asked.minimum:g} to {asked.maximum:g}." if rating is None else rating
+    return texts.typed_rating(line, asked)
 
 
 def _correction(line: str, position: Position) -> Event | str:

@@ -5,6 +5,7 @@ Neither correctness nor a score is in here, nor a method's name.
 
 from __future__ import annotations
 
+import math
 import unicodedata
 
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
@@ -15,7 +16,7 @@ from experiments.session import remarks, steps
 from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
-from experiments.tasks.questions import AnswerValue
+from experiments.tasks.questions import AnswerValue, Scale, on_scale
 
 FLAG_RULE = phrase("A flag is a word of at most {max_flag} letters, digits and hyphens.", max_flag=MAX_FLAG)
 
@@ -266,14 +267,19 @@ def typed_line(text: str) -> str:
     return "".join(" " if unicodedata.category(letter) == "Cc" else letter for letter in text).strip()
 
 
-def typed_number(text: str, minimum: float, maximum: float) -> float | None:
-    """A number as people type it, comma or point, if it lies on the scale.
+def typed_rating(text: str, scale: Scale) -> float | str:
+    """A number as people type it, comma or point, if it lies on the scale; else what to say.
 
-    >>> typed_number("7,5", 0, 10), typed_number("11", 0, 10), typed_number("nan", 0, 10)
-    (7.5, None, None)
+    Nothing is rounded: what is kept is what was said.
     """
     try:
-        number = float(text.strip().replace(",", "."))
+        number = float("nan" if "_" in text else text.strip().replace(",", "."))
     except ValueError:
-        return None
-    return number if minimum <= number <= maximum else None
+        number = math.nan
+    if not scale.minimum <= number <= scale.maximum:
+        return phrase("Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum)
+    if math.isclose(number, nearest := on_scale(number, scale), abs_tol=_TINY * scale.grain):
+        return nearest
+    other = on_scale(nearest + math.copysign(scale.grain, number - nearest), scale)
+    low, high = sorted((nearest, other))
+    return phrase("It goes in steps of {grain:g}: type {low:g} or {high:g}.", grain=scale.grain, low=low, high=high)

@@ -14,7 +14,7 @@ from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import FLAG_RULE, typed_line, typed_number
+from experiments.screens.texts import FLAG_RULE, typed_line, typed_rating
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
 from experiments.session.history import chosen_levels, entered_value
@@ -319,12 +319,9 @@ class Controls:
         scale = self.drawn.correcting or self.drawn.step
         if not isinstance(scale, Rate):
             return
-        rating = typed_number(typed, scale.minimum, scale.maximum)
-        if rating is None:
-            said = phrase(
-                "Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum
-            )
-            self._view.say(said, "bad")
+        rating = typed_rating(typed, scale)
+        if isinstance(rating, str):
+            self._view.say(rating, "bad")
         elif self._rate(rating, press):
             self._view.take_typed()
 
