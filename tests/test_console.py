@@ -225,8 +225,10 @@ def test_a_synthetic_participant_at_the_console_answers_as_in_data_mode(
         assert seen == [row[column] for row in rows(tmp_path, re.sub("^results", "data", stem), kind)]
 
 
-def test_without_a_display_the_console_says_so(quick_configs: Path, tmp_path: Path) -> None:
-    environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "QT_QPA_PLATFORM")}
+@pytest.mark.parametrize("named", [{}, {"DISPLAY": ":65432"}, {"QT_QPA_PLATFORM": "xcb"}])
+def test_without_a_display_the_console_says_so(quick_configs: Path, tmp_path: Path, named: dict[str, str]) -> None:
+    others = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    environment = {key: value for key, value in os.environ.items() if key not in others} | named
     done = subprocess.run(
         warm(*words(quick_configs, "direction", "--participant", "P01")),
         cwd=tmp_path,

@@ -35,7 +35,6 @@ from experiments.doctor.checks import (
     appends,
     carry_out_check,
     checks,
-    no_display,
     ticks,
     within_seconds,
 )
@@ -61,6 +60,7 @@ from experiments.doctor.figures import (
 from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.load import find, load_gun
 from experiments.record.journal import Journal, Record
+from experiments.screens.display import no_display
 from experiments.session.steps import (
     Answered,
     Fired,
@@ -288,7 +288,10 @@ def test_the_worst_verdict_counts_and_what_is_not_there_does_no_harm(found: list
     [
         ({}, "linux", True),
         ({"DISPLAY": ""}, "linux", True),
-        ({"DISPLAY": ":0"}, "linux", False),
+        ({"DISPLAY": ":nowhere"}, "linux", True),
+        ({"DISPLAY": ":65432"}, "linux", True),
+        ({"QT_QPA_PLATFORM": "xcb"}, "linux", True),
+        ({"QT_QPA_PLATFORM": "offscreen"}, "linux", False),
         ({"WAYLAND_DISPLAY": "wayland-0"}, "linux", False),
         ({}, "darwin", False),
         ({}, "win32", False),

@@ -10,7 +10,7 @@ import platform
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -48,6 +48,7 @@ from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.record.provenance import recoil_version
 from experiments.runner import gun_name
+from experiments.screens.display import unset_display
 from experiments.study.folders import PlaceError
 
 PACKAGES = ("numpy", "scipy", "PyQt6", "psychopy")
@@ -247,13 +248,6 @@ def _reason(error: Exception) -> str:
     )
 
 
-def no_display(environment: Mapping[str, str], platform: str) -> str:
-    """Why no window can open here; empty if one may. Qt ends the process where it has no display."""
-    if platform != "linux" or any(map(environment.get, ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))):
-        return ""
-    return "neither DISPLAY nor WAYLAND_DISPLAY is set"
-
-
 def _disk(results: Path) -> tuple[DoctorFinding, ...]:
     try:
         return (verdicts.of_disk(within_seconds(DEADLINE_S, partial(appends, results))),)
@@ -338,7 +332,7 @@ def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[Docto
 
 
 def _on_display(name: str, program: str, seconds: float = DEADLINE_S) -> tuple[DoctorFinding, ...]:
-    missing = no_display(os.environ, sys.platform)
+    missing = unset_display(os.environ, sys.platform)
     answer = ProgramReply(absent=missing) if missing else ask(program, seconds)
     if answer.figures is not None:
         return (verdicts.of_seen(answer.figures),)

@@ -34,6 +34,7 @@ from experiments.screens.console.windows import (
     open_as_left,
     signals_to,
 )
+from experiments.screens.display import no_display
 from experiments.session import events
 from experiments.session.events import Hand
 from experiments.session.remarks import Noted, Remark
@@ -53,8 +54,8 @@ _END_S = 1.5
 
 def application() -> QApplication:
     """The Qt application. `PlaceError` without a display, where Qt would end the process."""
-    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))):
-        raise PlaceError("--screen console: there is no display; use --screen terminal, or set DISPLAY")
+    if not _only_application.cache_info().currsize and (why := no_display(os.environ, sys.platform)):
+        raise PlaceError(f"--screen console: there is no display: {why}; use --screen terminal, or set DISPLAY")
     return _only_application()
 
 
