@@ -41,7 +41,7 @@ from experiments.record.replay import RunPosition
 from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
-from experiments.session.history import GrowingHistory
+from experiments.session.history import GrowingHistory, answered
 from experiments.session.remarks import Noted
 from experiments.session.steps import Answered, Session, step_record
 from experiments.study import balance, folders, preregistration, register
@@ -62,7 +62,7 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
         super().__init__(
             f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
             f"{date_text(last.utc)} after record {last.n}: {where.journal}; "
-            "--resume goes on with it, --fresh sets it aside and starts anew"
+            "--resume goes on with it, --fresh --reason TEXT sets it aside and starts anew"
         )
         self.where, self.contents = where, contents
 
@@ -225,9 +225,21 @@ def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
         if request.again == "ask":
             raise UnfinishedRun(where, contents)
         return contents
+    _refuse_unsaid(where, contents, request)
     _record_reason(where, request.anew_reason, clock)
     folders.set_aside(where)
     return None
+
+
+def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest) -> None:
+    """`PlaceError`: what a person answered is set aside, and nobody says why."""
+    if contents is None or request.practice or request.anew_reason or contents.head.participant != "person":
+        return
+    if count := len(answered(replay.history(contents), ())):
+        raise PlaceError(
+            f"{where.journal}: trials with answers: {count}; --fresh sets them aside, so say why with --reason TEXT, "
+            "for the register, or go on with --resume"
+        )
 
 
 GAVE_WAY = "a synthetic run, which gave way to a person's"

@@ -127,11 +127,20 @@ def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path,
         assert screen.end() == 2
         assert "has an unfinished run of direction" in screen.seen
     with AtTerminal(run(quick_configs, "direction", "--fresh"), tmp_path) as screen:
+        assert screen.end() == 2
+        assert "trials with answers: 2; --fresh sets them aside, so say why with --reason TEXT" in screen.seen
+    with AtTerminal(run(quick_configs, "direction", "--fresh", "--reason", "wrong damper"), tmp_path) as screen:
         screen.wait_for("Trial 1 of")
         screen.type("stop")
         assert screen.end() == 130
+    with AtTerminal(run(quick_configs, "direction", "--fresh"), tmp_path) as screen:  # nothing was answered yet
+        screen.wait_for("Trial 1 of")
+        screen.type("stop")
+        assert screen.end() == 130
+    assert "wrong damper" in (tmp_path / "results/participants.jsonl").read_text(encoding="utf-8")
     aside = sorted(path.name for path in (tmp_path / "results/sub-P01").glob("*aside*"))
-    assert aside == ["sub-P01_task-direction_journal.aside-1.jsonl", "sub-P01_task-direction_trials.aside-1.csv"]
+    names = ("sub-P01_task-direction_journal.aside-{}.jsonl", "sub-P01_task-direction_trials.aside-{}.csv")
+    assert aside == [name.format(number) for name in names for number in (1, 2)]
 
 
 def test_two_consoles_cannot_run_one_participant(quick_configs: Path, tmp_path: Path) -> None:
