@@ -237,8 +237,7 @@ def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest)
         return
     if count := len(answered(replay.history(contents), ())):
         raise PlaceError(
-            f"{where.journal}: trials with answers: {count}; --fresh sets them aside, so say why with --reason TEXT, "
-            "for the register, or go on with --resume"
+            f"{where.journal}: trials with answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
         )
 
 

@@ -32,6 +32,7 @@ from experiments.run import Finished, run
 from experiments.run_request import RunRequest
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.controls import Controls, TextField
+from experiments.screens.console.instructions import instruction
 from experiments.screens.console.keys import Name, Presses
 from experiments.screens.console.view import About, Ended, GunSeen, Seen
 from experiments.session import events
@@ -346,7 +347,7 @@ class PaperWindow:
         assert self.live is not None
         assert self.controls is not None
         seen = Seen(about=self.about, position=drawn, told=self.live.history, gun=self.gun, now_s=self._clock.now())
-        shown = view.instruction(seen)
+        shown = instruction(seen)
         self.heard += [shown.title, shown.damper, shown.detail, view.where_text(seen)]
         self.heard += [*progress.coming(seen), *progress.answer_lines(seen), *self.controls.help_lines()]
 

@@ -22,6 +22,7 @@ from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import damper
 from experiments.load import load_setup
 from experiments.screens.console import progress, view, widgets
+from experiments.screens.console.instructions import instruction
 from experiments.screens.console.progress import trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
 from experiments.screens.texts import ends_text, typed_rating
@@ -58,7 +59,7 @@ def seen(setup: Setup[DesignConfig], position: Position, *told: Any, **more: Any
 
 
 def shown_texts(here: Seen) -> list[str]:
-    shown = view.instruction(replace(here, now_s=10.0))
+    shown = instruction(replace(here, now_s=10.0))
     texts = [shown.title, shown.damper, shown.detail, view.where_text(here), *progress.coming(here)]
     return [*texts, *progress.answer_lines(here), *progress.marks(here), progress.gun_text(here)[0]]
 
@@ -93,7 +94,7 @@ def test_every_state_says_what_to_do_and_none_says_anything_of_how_good_the_part
 ) -> None:
     with sat_at(state, tmp_path) as sitting:
         sitting.window.paint()
-        assert view.instruction(Seen(about=sitting.window.about, position=sitting.position)).title
+        assert instruction(Seen(about=sitting.window.about, position=sitting.position)).title
         assert not [text for text in sitting.window.heard if tells_correctness(text)]
 
 
@@ -136,7 +137,7 @@ def test_what_the_console_says_in_english_keeps_its_sides_beside_a_question_from
 ) -> None:
     step = replace(make_step(plan_of(PREFERENCE).trials[0]), text=QUESTION)
     here = seen(PREFERENCE, Position(states=(State.RATING if step.kind != "ask" else State.ASKING,), step=step))
-    asked = view.instruction(replace(here, about=replace(here.about, participant_rates=there, participant_keys=there)))
+    asked = instruction(replace(here, about=replace(here.about, participant_rates=there, participant_keys=there)))
     assert not reads_from_the_left(QUESTION)
     assert QUESTION in f"{asked.title}\n{asked.detail}"
     assert reads_from_the_left(asked.title)
@@ -167,20 +168,20 @@ def test_a_scale_whose_ends_are_from_the_right_keeps_its_low_end_on_the_left(mon
 def test_the_gun_is_shown_as_it_says_itself_and_never_as_safe_when_it_says_nothing() -> None:
     halted = Position(states=(State.HALTED,))
     silent = seen(DIRECTION, halted, gun=GunSeen(status=None, asked_s=1.0, fault="no answer"))
-    assert "does not say that it is disarmed: SWITCH OFF ITS POWER" in view.instruction(silent).damper
-    assert "SWITCH OFF ITS POWER" in view.instruction(seen(DIRECTION, halted)).damper
+    assert "does not say that it is disarmed: SWITCH OFF ITS POWER" in instruction(silent).damper
+    assert "SWITCH OFF ITS POWER" in instruction(seen(DIRECTION, halted)).damper
     assert progress.gun_text(silent)[1] == "bad"
 
 
 def test_what_the_gun_said_before_an_emergency_stop_says_nothing_of_what_it_is_after_it() -> None:
     halted, disarmed = Position(states=(State.HALTED,), since_s=5.0), status_of("disarmed")
     before = seen(DIRECTION, halted, gun=GunSeen(status=disarmed, asked_s=4.99))
-    assert "Disarming" in view.instruction(before).damper
-    assert "SWITCH OFF ITS POWER" in view.instruction(before).damper
+    assert "Disarming" in instruction(before).damper
+    assert "SWITCH OFF ITS POWER" in instruction(before).damper
     after = replace(before, gun=GunSeen(status=disarmed, asked_s=5.0))
-    assert view.instruction(after).damper == "The gun itself says that it is disarmed."
+    assert instruction(after).damper == "The gun itself says that it is disarmed."
     armed = replace(before, gun=GunSeen(status=status_of("armed"), asked_s=5.1))
-    assert "does not say that it is disarmed" in view.instruction(armed).damper
+    assert "does not say that it is disarmed" in instruction(armed).damper
 
 
 def test_a_gun_that_has_not_answered_for_a_while_is_not_shown_in_its_last_state() -> None:
@@ -200,8 +201,8 @@ def test_an_armed_gun_is_not_shown_armed_for_good_after_the_end() -> None:
 
 def test_a_test_shot_is_promised_only_where_the_emergency_stop_is_on_record() -> None:
     halted = seen(DIRECTION, Position(states=(State.HALTED,)))
-    assert "begins with a test shot" in view.instruction(halted).detail
-    unsaved = view.instruction(replace(halted, halt_unsaved=True)).detail
+    assert "begins with a test shot" in instruction(halted).detail
+    unsaved = instruction(replace(halted, halt_unsaved=True)).detail
     assert "begins with a test shot" not in unsaved
     assert "not on record" in unsaved
 
@@ -215,8 +216,8 @@ def test_rating_and_description_are_awaited_from_the_participants_screen_where_t
         here = seen(PREFERENCE, Position(states=(state,), step=step))
         there = replace(here, about=replace(here.about, participant_rates=True))
         awaited = f"Awaited: the participant's {what} on their own screen, or type it here."
-        assert view.instruction(here).detail == "?"
-        assert view.instruction(there).detail == f"?\n{awaited}"
+        assert instruction(here).detail == "?"
+        assert instruction(there).detail == f"?\n{awaited}"
 
 
 def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
@@ -226,7 +227,7 @@ def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
         (DIRECTION, ask, State.ASKING, {"participant_keys": True}),
     ):
         here = seen(setup, Position(states=(state,), step=step(plan_of(setup).trials[0])), participant=gone)
-        detail = view.instruction(replace(here, about=replace(here.about, **does))).detail
+        detail = instruction(replace(here, about=replace(here.about, **does))).detail
         assert "Awaited" not in detail
         assert "Their screen is gone." in detail
 
@@ -249,7 +250,7 @@ def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_
 
 def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None:
     def end(**how: Any) -> str:
-        return view.instruction(seen(DIRECTION, Position(), ended=Ended(**how))).detail
+        return instruction(seen(DIRECTION, Position(), ended=Ended(**how))).detail
 
     assert "1 answer," in end(reason="lunch", saved=1)
     assert "2 answers," in end(reason="lunch", saved=2)

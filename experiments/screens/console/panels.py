@@ -11,8 +11,9 @@ from PyQt6.QtGui import QPainter, QPaintEvent, QResizeEvent, QShowEvent
 from experiments.screens import texts
 from experiments.screens.console import progress, widgets
 from experiments.screens.console.controls import TextField
+from experiments.screens.console.instructions import Instruction
 from experiments.screens.console.keys import field_at
-from experiments.screens.console.view import About, Instruction, Seen
+from experiments.screens.console.view import About, Seen
 from experiments.screens.phrases import phrase
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.states import Position, State

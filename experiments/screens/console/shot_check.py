@@ -22,7 +22,7 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.screens.console import widgets
-from experiments.screens.console.view import DISARMING
+from experiments.screens.console.instructions import DISARMING
 from experiments.screens.console.widgets import TextLines
 from experiments.screens.phrases import phrase
 

@@ -5,7 +5,6 @@ Neither correctness nor a score is in here. The method's name appears only where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from device import GunStatus
@@ -13,17 +12,15 @@ from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessage
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
-from experiments.live_run import HALT_UNSAVED, LiveRun
+from experiments.live_run import LiveRun
 from experiments.screens import texts
 from experiments.screens.console.keys import Name, choices_at, shown_key
-from experiments.screens.phrases import isolated, phrase
-from experiments.session.history import History, entered_value, trial_at
+from experiments.screens.phrases import phrase
+from experiments.session.history import History, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Present, Rate, Rest, Step, what
+from experiments.session.steps import Describe, Outcome, Rate, Step
 
-DISARMING = phrase("Disarming. If the gun does not fall silent: SWITCH OFF ITS POWER.")
-"""What is shown from a stop until the gun has answered."""
 THANK_PARTICIPANT = phrase("Thank the participant.")
 """The last sentence, where nothing else comes next."""
 
@@ -147,19 +144,6 @@ class Seen:
         return trial_at(self.about.plan, self.told, self.position.step)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Instruction:
-    """What to do now: a line in the largest type, the damper in large type, what belongs to it, and a mood.
-
-    The mood chooses the colour; the words say it as well.
-    """
-
-    title: str
-    damper: str = ""
-    detail: str = ""
-    mood: str = "act"
-
-
 def typed_there(about: About, position: Position) -> bool:
     """Whether the participant's own screen has the keys, for as long as one rating or description follows the other."""
     asked = position.base in (State.RATING, State.DESCRIBING, State.SAVING)
@@ -195,255 +179,3 @@ def bands(seen: Seen) -> list[tuple[str, str]]:
     if seen.about.simulated:
         found.append((phrase("SIMULATED GUN – nothing is felt"), "simulated"))
     return found
-
-
-def instruction(seen: Seen) -> Instruction:
-    """What to do now."""
-    if seen.ended is not None:
-        return _end(seen.about, seen.ended)
-    shown = _OF_STATE.get(seen.position.state, _MOMENT)
-    return shown if isinstance(shown, Instruction) else shown(seen)
-
-
-def _end(about: About, ended: Ended) -> Instruction:
-    safe = (
-        ""
-        if ended.saved is None
-        else phrase("Read back from the disk: {answers}, all that were given. ", answers=_answers(ended.saved))
-    )
-    close = phrase("Q closes this window.")
-    if ended.reason is None:
-        return Instruction(title=phrase("Finished"), detail=f"{safe}{about.last}\n{close}", mood="good")
-    resumed = "" if ended.saved is None else phrase("{safe}The run can be resumed.", safe=safe)
-    detail = "\n".join(filter(None, (_sentence(ended.reason), resumed, close)))
-    return Instruction(title=phrase("Stopped"), detail=detail, mood="bad")
-
-
-def _sentence(why: str) -> str:
-    """A reason as a sentence of its own; a path at its beginning stays as it is.
-
-    >>> _sentence("the gun is gone"), _sentence("results/a.jsonl: the journal was deleted")
-    ('The gun is gone.', 'results/a.jsonl: the journal was deleted.')
-    """
-    first = why if "/" in why.split(" ", 1)[0] else f"{why[:1].upper()}{why[1:]}"
-    return first if first.endswith((".", "!", "?")) else f"{first}."
-
-
-def _answers(count: int) -> str:
-    return phrase("1 answer") if count == 1 else phrase("{count} answers", count=count)
-
-
-_MOMENT = Instruction(title=phrase("One moment"), mood="wait")
-
-
-def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
-    step = seen.position.step
-    if not isinstance(step, Prepare):
-        return _MOMENT
-    again = texts.again_text(seen.told, step)
-    told = texts.read_out_text(seen.about.plan, step).strip()
-    return Instruction(
-        title=phrase("{turn}\nand hand it over", turn=texts.turn_text(step)),
-        damper=damper.format(settings=texts.settings_text(step), method=method_text(seen.about, step.trial)),
-        detail="\n".join(filter(None, (told, again, then))),
-    )
-
-
-def _setting(seen: Seen) -> Instruction:
-    step = seen.position.step
-    names = " and ".join(name for name, _ in step.settings) if isinstance(step, Prepare) else ""
-    then = phrase("Confirm the {names} with {damper_key}.", names=names, damper_key=seen.key("damper"))
-    return _turned(seen, damper=phrase("Set the {settings}{method}"), then=then)
-
-
-def _preparing(seen: Seen) -> Instruction:
-    step = seen.position.step
-    damper = phrase("The {settings}{method}") if isinstance(step, Prepare) and step.settings else ""
-    return _turned(seen, damper=damper, then=phrase("Then fire with {fire_key}.", fire_key=seen.key("fire")))
-
-
-def _train(seen: Seen) -> Instruction:
-    least_s = seen.position.step.least_exposure_s if isinstance(seen.position.step, Present) else 0.0
-    after = phrase(", not before {least_s:g}\N{NO-BREAK SPACE}s", least_s=least_s) if least_s else ""
-    return Instruction(
-        title=phrase("Wait for “next”"),
-        detail=phrase(
-            "The gun goes on firing until then. Press Space when the participant says it{after}.", after=after
-        ),
-        mood="ask",
-    )
-
-
-def _asking(seen: Seen) -> Instruction:
-    step = seen.position.step
-    if not isinstance(step, Ask):
-        return _MOMENT
-    own_keys = either(
-        phrase("{own_key} for {label}", own_key=one.own_key.upper(), label=one.told) for one in step.choices
-    )
-    own = phrase(
-        "Awaited: the participant's own key, {own_keys}.\n{keys} enters it for them.",
-        own_keys=own_keys,
-        keys=_keys(step),
-    )
-    told = phrase("Enter what the participant says: {keys}.", keys=_keys(step))
-    there = _asked_there(seen, own, told) if seen.about.participant_keys else told
-    about = _order_told(seen, step) if step.later else ""
-    return Instruction(title=isolated(step.text), detail="\n".join(filter(None, (about, there))), mood="ask")
-
-
-def _keys(asked: Ask) -> str:
-    return either(one.key.upper() for one in asked.choices)
-
-
-def either(words: Iterable[str]) -> str:
-    """Words, one of which is meant.
-
-    >>> either(["F", "B"]), either("123")
-    ('F or B', '1, 2 or 3')
-    """
-    *before, last = words
-    return phrase("{before} or {last}", before=", ".join(before), last=last) if before else last
-
-
-def _asked_there(seen: Seen, awaited: str, here: str) -> str:
-    """What is awaited from the participant's screen, or that there is none any more."""
-    return (
-        phrase("Their screen is gone. {here} To start it again, pause first.", here=here)
-        if seen.participant_gone
-        else awaited
-    )
-
-
-def _rating(seen: Seen) -> Instruction:
-    step = seen.position.step
-    if not isinstance(step, Rate | Describe):
-        return _MOMENT
-    kind = what(step)
-    own = phrase("Awaited: the participant's {kind} on their own screen, or type it here.", kind=kind)
-    there = _asked_there(seen, own, phrase("Type here what they say.")) if seen.about.participant_rates else ""
-    question = isolated(step.text)
-    title, *more = (_order_told(seen, step), question) if step.later else (question,)
-    return Instruction(title=title, detail="\n".join(filter(None, (*more, there))), mood="ask")
-
-
-def _order_told(seen: Seen, step: Asking) -> str:
-    """Which stimulus it is about, in the participant's words: it is read out."""
-    return isolated(texts.ordinal(seen.about.plan, step.trial, seen.about.messages))
-
-
-def _telling(seen: Seen) -> Instruction:
-    step = seen.position.step
-    if not isinstance(step, Inform):
-        return _MOMENT
-    title = {
-        "instruction": phrase("Tell the participant"),
-        "consent": phrase("Ask the participant for their consent"),
-        "feedback": phrase("Tell the participant"),
-    }[step.what]
-    return Instruction(
-        title=title,
-        detail=phrase("“{text}”\n{enter_key} when that is done.", text=step.text, enter_key=seen.key("enter")),
-        mood="act",
-    )
-
-
-def _resting(seen: Seen) -> Instruction:
-    until_s, step = seen.position.until_s, seen.position.step
-    left_s = 0 if until_s is None else max(0, round(until_s - seen.now_s))
-    between = step.between if isinstance(step, Rest) else ""
-    return Instruction(
-        title=phrase("Break: {duration}", duration=texts.duration_text(left_s)),
-        detail=phrase("Between {between}. It ends by itself with a tone.", between=between),
-        mood="rest",
-    )
-
-
-def _paused(seen: Seen) -> Instruction:
-    if seen.position.why:
-        again = phrase(
-            "{restart_key} starts it again. {go_on_key} goes on without it: you enter the answers.",
-            restart_key=seen.key("restart"),
-            go_on_key=seen.key("go on"),
-        )
-        detail = f"{_sentence(seen.position.why)}\n{again}"
-    else:
-        detail = phrase("The gun is disarmed, and nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
-    return Instruction(title=phrase("Paused"), detail=detail, mood="wait")
-
-
-def _correcting(seen: Seen) -> Instruction:
-    entry = seen.position.correcting
-    if entry is None:
-        return _MOMENT
-    return Instruction(
-        title=phrase("Correct the {what}", what=what(entry)),
-        damper=texts.place_text(seen.about.plan, entry.trial),
-        detail=phrase(
-            "It was entered as {value}. {entered_how}\n{undo_key} goes further back, Esc leaves it.",
-            value=texts.value_text(entry, entered_value(seen.told, entry)),
-            entered_how=_entered_how(entry),
-            undo_key=seen.key("undo"),
-        ),
-        mood="ask",
-    )
-
-
-def _entered_how(entry: Asking) -> str:
-    match entry:
-        case Ask():
-            return phrase("Enter what the participant said: {keys}.", keys=_keys(entry))
-        case Rate():
-            return phrase("Type what the participant said, Enter saves; Ctrl+X for no answer.")
-        case Describe():
-            return phrase("Type the participant's words; Enter saves.")
-
-
-def _halted(seen: Seen) -> Instruction:
-    closes = phrase(
-        "Nothing fires in this run any more. {reason_key} says why, {stop_key} closes it.",
-        reason_key=seen.key("reason"),
-        stop_key=seen.key("stop"),
-    )
-    resumed = HALT_UNSAVED if seen.halt_unsaved else phrase("Resumed, it begins with a test shot.")
-    return Instruction(
-        title=phrase("EMERGENCY STOP"), damper=_since_halt(seen), detail=f"{closes} {resumed}", mood="bad"
-    )
-
-
-def _since_halt(seen: Seen) -> str:
-    """What the gun said since the emergency stop: what it said before says nothing of now."""
-    gun = seen.gun
-    if gun is None or gun.asked_s < seen.position.since_s:
-        return DISARMING
-    if gun.status is not None and gun.status.state == "disarmed":
-        return phrase("The gun itself says that it is disarmed.")
-    return phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
-
-
-_OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
-    State.REARMING: Instruction(
-        title=phrase("There was an emergency stop.\nStand clear."),
-        detail=phrase(
-            "Put the gun where it hurts nobody, then hold T for a second: a test shot, then the run goes on."
-        ),
-        mood="bad",
-    ),
-    State.SETTING: _setting,
-    State.PREPARING: _preparing,
-    State.FIRING: Instruction(title=phrase("Firing"), detail=phrase("F12 stops it at once."), mood="wait"),
-    State.TRAIN: _train,
-    State.ASKING: _asking,
-    State.RATING: _rating,
-    State.DESCRIBING: _rating,
-    State.INFORMING: _telling,
-    State.RESTING: _resting,
-    State.CLOSING: Instruction(
-        title=phrase("Everything is answered"),
-        detail=phrase("Is there anything to correct, to note or to flag? Enter ends the run."),
-        mood="good",
-    ),
-    State.PAUSED: _paused,
-    State.CORRECTING: _correcting,
-    State.HALTED: _halted,
-}

@@ -14,6 +14,7 @@ from experiments.live_run import LiveRun
 from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
+from experiments.screens.console.instructions import instruction
 from experiments.screens.console.keys import BY_NAME, Name, Typing
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import marks
@@ -238,7 +239,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if self.controls is not None:
             self.controls.tick(here=self.isActiveWindow())
         seen = self.seen
-        self.notice.put(view.instruction(seen))
+        self.notice.put(instruction(seen))
         self.place.setText(view.where_text(seen))
         self._show_bands(seen)
         self.bars.put(seen)
