@@ -465,6 +465,29 @@ def test_a_rating_is_taken_as_it_was_typed_or_not_at_all(grain: float, typed: st
     assert typed_rating(typed, scale) == meant
 
 
+@pytest.mark.parametrize("state", [State.SETTING, State.PREPARING])
+def test_a_gun_that_does_not_answer_is_not_handed_over(state: State) -> None:
+    here = seen(DIRECTION, Position(states=(state,), step=prepare(plan_of(DIRECTION).trials[0])))
+    lost = replace(here, gun=GunSeen(status=None, asked_s=9.0, fault="the gun is not there"))
+    for silent in (lost, replace(here, gun=GunSeen(status=replace(status_of("fault"), fault="too hot"), asked_s=9.0))):
+        shown = instruction(silent)
+        assert (shown.title, shown.mood) == ("See to the gun first", "bad")
+        assert "its cable and its power before anybody takes it" in shown.detail
+        assert "hand it over" not in shown.title + shown.detail
+    assert "The gun is not there." in instruction(lost).detail
+    assert "hand it over" in instruction(replace(here, gun=GunSeen(status=status_of("disarmed"), asked_s=9.0))).title
+
+
+def test_a_training_promises_nothing_that_is_not_kept() -> None:
+    halted = seen(DIRECTION, Position(states=(State.HALTED,), step=ask(plan_of(DIRECTION).trials[0])))
+    training = replace(halted, about=replace(halted.about, band="TRAINING"))
+    assert "test shot" in instruction(halted).detail
+    assert "test shot" not in instruction(training).detail
+    for here, is_kept in ((halted, True), (training, False)):
+        said = instruction(replace(here, ended=Ended(reason="emergency stop", saved=3))).detail
+        assert ("3 answers" in said, "The run can be resumed" in said) == (is_kept, is_kept)
+
+
 # several questions a trial
 
 

@@ -34,20 +34,40 @@ def instruction(seen: Seen) -> Instruction:
     """What to do now."""
     if seen.ended is not None:
         return _end(seen.about, seen.ended)
+    if seen.position.state in (State.SETTING, State.PREPARING) and (trouble := gun_trouble(seen)):
+        return _see_to_the_gun(trouble)
     shown = _OF_STATE.get(seen.position.state, _MOMENT)
     return shown if isinstance(shown, Instruction) else shown(seen)
 
 
+def gun_trouble(seen: Seen) -> str:
+    """Why the gun is not to be handed over: it has a fault, or does not answer; empty if neither is so."""
+    if seen.gun is None:
+        return ""
+    status = seen.gun.status
+    return seen.gun.fault if status is None else status.fault or ""
+
+
+def _see_to_the_gun(trouble: str) -> Instruction:
+    """Nobody is to take a gun in an unknown state."""
+    detail = phrase(
+        "{trouble}.\nLook at its cable and its power before anybody takes it. When it answers, the run goes on here.",
+        trouble=trouble[:1].upper() + trouble[1:].rstrip("."),
+    )
+    return Instruction(title=phrase("See to the gun first"), detail=detail, mood="bad")
+
+
 def _end(about: About, ended: Ended) -> Instruction:
+    kept = ended.saved if not about.band else None  # of a practice or training nothing is gone on with
     safe = (
         ""
-        if ended.saved is None
-        else phrase("Read back from the disk: {answers}, all that were given. ", answers=_answers(ended.saved))
+        if kept is None
+        else phrase("Read back from the disk: {answers}, all that were given. ", answers=_answers(kept))
     )
     close = phrase("Q closes this window.")
     if ended.reason is None:
         return Instruction(title=phrase("Finished"), detail=f"{safe}{about.last}\n{close}", mood="good")
-    resumed = "" if ended.saved is None else phrase("{safe}The run can be resumed.", safe=safe)
+    resumed = "" if kept is None else phrase("{safe}The run can be resumed.", safe=safe)
     detail = "\n".join(filter(None, (_sentence(ended.reason), resumed, close)))
     return Instruction(title=phrase("Stopped"), detail=detail, mood="bad")
 
@@ -226,8 +246,10 @@ def _entered_how(entry: Asking) -> str:
     match entry:
         case Ask():
             return phrase("Enter what the participant said: {keys}.", keys=_keys(entry))
-        case Rate():
+        case Rate(may_be_skipped=True):
             return phrase("Type what the participant said, Enter saves; Ctrl+X for no answer.")
+        case Rate():
+            return phrase("Type what the participant said, Enter saves.")
         case Describe():
             return phrase("Type the participant's words; Enter saves.")
 
@@ -239,8 +261,9 @@ def _halted(seen: Seen) -> Instruction:
         stop_key=seen.key("stop"),
     )
     resumed = HALT_UNSAVED if seen.halt_unsaved else phrase("Resumed, it begins with a test shot.")
+    resumed = "" if seen.about.band else resumed
     return Instruction(
-        title=phrase("EMERGENCY STOP"), damper=_since_halt(seen), detail=f"{closes} {resumed}", mood="bad"
+        title=phrase("EMERGENCY STOP"), damper=_since_halt(seen), detail=f"{closes} {resumed}".strip(), mood="bad"
     )
 
 
