@@ -87,7 +87,7 @@ PARTICIPANT = text_column("participant_id", "participant's code, letters and dig
 _METHOD = level_column("method", (), "rendering method, as the config names it", required=True)
 ATTEMPTS = integer_column(
     "attempts",
-    "how often the stimulus was presented; more than 1 after a fault, pause or repeat: answers are those to the last one",
+    "how often the stimulus was presented; more than 1 after a fault, pause or repeat; answers are to the last one",
     most=MOST_OFTEN,
 )
 FLAGS = text_column(
