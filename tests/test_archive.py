@@ -384,6 +384,21 @@ def test_an_archive_without_its_manifest_is_none(copy: Path) -> None:
         verify(copy)
 
 
+@pytest.mark.parametrize("content", ["[]", "NaN", '{"sha256": 1e999}', '"text"'])
+@pytest.mark.parametrize("path", ["preregistration/preregistration-1.json", "archive.json", "analysis/statistics.json"])
+def test_a_file_that_is_no_json_object_is_a_fault_of_the_archive(copy: Path, path: str, content: str) -> None:
+    placing.write_file(copy, path, content.encode())
+    sealed(copy)
+    assert any(f"{path}: " in fault for fault in verify(copy).faults)
+
+
+@pytest.mark.parametrize("version", ["NaN", "1e999"])
+def test_versions_that_are_no_numbers_are_a_fault_of_the_archive(copy: Path, version: str) -> None:
+    _edited(copy, "analysis/statistics.json", '"versions": {', f'"versions": {{"numpy-like": {version},')
+    (fault,) = verify(copy).faults
+    assert f"{version} is no number of JSON" in fault
+
+
 def test_settings_that_say_nothing_are_named(copy: Path) -> None:
     (copy / "archive.json").write_text("[]")
     sealed(copy)

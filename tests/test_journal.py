@@ -293,6 +293,8 @@ def test_a_missing_head_is_noticed(path: Path) -> None:
         (b'{"n":3,"kind":{}}', "kind must be one of"),
         (b'{"kind":"step"}', "record number is None, must be 3"),
         (b'{"n":"3","kind":"step"}', "record number is '3', must be 3"),
+        (b'{"n":3,"kind":"step","x":NaN}', "not a JSON record (NaN is no number of JSON)"),
+        (b'{"n":3,"kind":"step","x":-1e999}', "not a JSON record (-1e999 is no number of JSON)"),
         (b"[" * 100_000, "not a JSON record (it nests too deep)"),
         (b'{"n":' + b"9" * 5000 + b',"kind":"step"}', "not a JSON record (a number has thousands of digits)"),
     ],
@@ -320,6 +322,12 @@ def test_a_head_that_is_none_is_refused(tmp_path: Path, record: dict[str, Any]) 
     for reader in (read_journal, head):
         with pytest.raises(JournalError, match="j: line 1: "):
             reader(tmp_path / "j")
+
+
+def test_a_head_with_a_number_beyond_all_numbers_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "j").write_text('{"n":0,"kind":"run","plan":{"x":1e999},"setup":{},"link":""}\n')
+    with pytest.raises(JournalError, match=r"j: line 1: not a JSON record \(1e999 is no number of JSON\)"):
+        head(tmp_path / "j")
 
 
 def test_line_ends_of_another_system_do_no_harm(path: Path) -> None:

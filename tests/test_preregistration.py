@@ -457,15 +457,48 @@ def test_a_forger_who_makes_a_new_hash_is_found_by_the_journals_and_by_the_amend
     assert any(f"no preregistration {first.short} that can be trusted" in one and "P01" in one for one in problems)
 
 
+def faults_in_archive(study: Path) -> list[str]:
+    """What is wrong with the preregistrations of a folder that has them where an archive does."""
+    (study / "preregistration").mkdir()
+    for path in study.glob("preregistration-*"):
+        path.rename(study / "preregistration" / path.name)
+    return preregistration_faults(study)
+
+
 def test_a_freeze_in_an_archive_is_held_against_the_journals_there(begun: Path) -> None:
-    place = begun / "preregistration"
-    place.mkdir()
     assert ["the journals of P01 name" in one for one in preregistration_faults(begun)] == [True]
-    for path in begun.glob("preregistration-*"):
-        path.rename(place / path.name)
-    assert preregistration_faults(begun) == []
-    forged(place / "preregistration-1.json", "value")
+    assert faults_in_archive(begun) == []
+    forged(begun / "preregistration" / "preregistration-1.json", "value")
     assert preregistration_faults(begun)[0].startswith("preregistration/preregistration-1.json: was edited")
+
+
+@pytest.mark.parametrize("whole", ["[]", "5", "NaN", '"text"'])
+def test_a_freeze_that_is_no_json_object_is_named(frozen: Path, whole: str) -> None:
+    (frozen / "preregistration-2.json").write_text(whole)
+    (said,) = freeze_status(frozen).problems
+    assert said.startswith(f"{frozen / 'preregistration-2.json'}: was edited, or is of another version")
+
+
+@pytest.mark.parametrize("number", ["NaN", "-Infinity", "1e999"])
+def test_a_freeze_with_what_is_no_number_ends_no_command(begun: Path, number: str) -> None:
+    path = begun / "preregistration-1.json"
+    path.write_text(path.read_text().replace('"participants": 14', f'"participants": {number}', 1))
+    setup, named = load_setup(begun / "preference.toml"), f"{path}: was edited, or is of another version"
+    assert next(run_warnings(setup, begun / "results", [])).startswith(named)
+    assert any(one.startswith(named) for one in overview(open_study(begun)).problems)
+    assert named in check_text(check(str(begun / "direction.toml"), None, 14))
+    with pytest.raises(PreregistrationError, match="was edited"):
+        freeze(begun, "", RealClock())
+    assert any(one.startswith(named) for one in deviations(read_logs([begun / "results"]), AnalysisFiles())[1])
+    assert any("was edited" in one for one in faults_in_archive(begun))
+
+
+def test_a_freeze_with_a_hash_of_its_own_whose_study_is_none_is_named(frozen: Path) -> None:
+    path = frozen / "preregistration-1.json"
+    first = freeze_status(frozen).chain.every[0]
+    other = first.model_copy(update={"files": first.files | {"study.toml": {}}})
+    path.write_text(json.dumps(dict(other.record())))
+    assert f"{path}: was edited, or is of another version" in freeze_status(frozen).problems[0]
 
 
 def test_a_freeze_that_was_renamed_is_named_so(frozen: Path) -> None:

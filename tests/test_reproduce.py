@@ -14,11 +14,12 @@ from statsmodels.stats.anova import AnovaRM
 
 from analysis.logs.reading import read_logs
 from analysis.predict.drawn import DirectionStudies, RatingStudies, studies_of
-from analysis.predict.reproduction.study import prepared
+from analysis.predict.reproduction.study import MANIFEST, claim_folder, prepared
 from analysis.predict.synthetic_studies import direction_counts, preference_scores
 from analysis.summary.summary import summarize
 from experiments.design.streams import generator
 from experiments.load import load_setup
+from experiments.study.folders import PlaceError
 from tests.reproduced import EXPERIMENTS, scores, statistics
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
@@ -158,6 +159,14 @@ def test_participants_drawn_by_the_configs_stay_an_option() -> None:
     assert other.manifest() != study.manifest()
     laws = [setup.laws.questions[question] for setup, question in zip(other.answering, QUESTIONS, strict=True)]
     assert [law.law for law in laws] == ["table", "table"]
+
+
+@pytest.mark.parametrize("content", [b"{", b"\xff", b"[" * 100_000])
+def test_a_manifest_that_is_no_json_is_named_and_its_folder_left_alone(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / MANIFEST).write_bytes(content)
+    with pytest.raises(PlaceError, match=rf"{MANIFEST}: is no manifest of a reproduction that can be read"):
+        claim_folder(prepared("study", 1, "rates"), tmp_path)
+    assert (tmp_path / MANIFEST).read_bytes() == content
 
 
 def test_what_is_killed_is_set_aside_by_another_seed_and_gone_on_with_by_the_same(

@@ -26,6 +26,7 @@ from analysis.summary.results import STATISTICS_FILE
 from device.words import RecoilError
 from experiments.rebuild import rebuild, shots_path, shots_table
 from experiments.record import journal, storage
+from experiments.record.lines import strict_json
 from experiments.study.folders import PlaceError
 from experiments.study.register import REGISTER_FILE
 
@@ -146,7 +147,7 @@ def _versions(folder: Path) -> object:
 
 def _json(path: Path) -> object:
     try:
-        return json.loads(storage.read_whole(path))
+        return strict_json(storage.read_whole(path))
     except (OSError, ValueError, RecursionError) as error:
         raise PlaceError(f"{path}: is no JSON file that can be read ({error})") from error
 

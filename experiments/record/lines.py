@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+from pydantic import JsonValue
 
 from device.words import RecoilError
 
@@ -11,10 +16,18 @@ class LineError(RecoilError):
     """A line that is no record, or does not follow from the one before; the message has no place."""
 
 
+def strict_json(data: bytes, pairs: Callable[[Sequence[tuple[str, JsonValue]]], object] | None = None) -> object:
+    """JSON that can be hashed; `ValueError` for NaN, infinities and what is none, `RecursionError` if it is too deep.
+
+    Python reads NaN, Infinity and 1e999, of which no hash can be made. `pairs` makes the objects, else they are dicts.
+    """
+    return json.loads(data.decode(), parse_constant=_no_number, parse_float=_finite, object_pairs_hook=pairs)
+
+
 def parsed_line(line: bytes) -> dict[str, object]:
     """The JSON object on a line; else `LineError`. NaN and halves of characters are no JSON that can be written."""
     try:
-        value = json.loads(line.decode(), parse_constant=_no_number)
+        value = strict_json(line)
         if b"\\u" in line:
             json.dumps(value, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
@@ -33,8 +46,15 @@ def _why_no_json(error: ValueError | RecursionError) -> str:
     return "a number has thousands of digits" if "integer string conversion" in str(error) else str(error)
 
 
-def _no_number(name: str) -> object:
+def _no_number(name: str) -> NoReturn:
     raise ValueError(f"{name} is no number of JSON")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        _no_number(text)
+    return value
 
 
 def check_chain(value: dict[str, object], number: int, before: str) -> None:

@@ -23,6 +23,7 @@ from experiments.config.door import ConfigError, Model, StudyConfig, read_toml
 from experiments.config.setup import Setup, sha256
 from experiments.design.config import DesignConfig
 from experiments.record import storage
+from experiments.record.lines import strict_json
 
 STUDY_FILE = "study.toml"
 JOURNALS = "results/sub-*/sub-*_journal.jsonl"
@@ -267,14 +268,18 @@ def _edited_page(path: Path, one: Preregistration) -> Iterator[str]:
 def _read(path: Path, number: int) -> Preregistration:
     """One that can be trusted. `PreregistrationError`: it is missing, or was edited."""
     try:
-        found = json.loads(storage.read_whole(path), object_pairs_hook=_once)
+        found = strict_json(storage.read_whole(path), pairs=_once)
+        if not isinstance(found, dict):
+            raise ValueError("it is no JSON object")
         stated = found.pop("sha256", None)
         one = Preregistration.model_validate_json(json.dumps(found))
+        if STUDY_FILE in one.files:
+            StudyConfig.model_validate_json(json.dumps(one.files[STUDY_FILE]))
     except FileNotFoundError as error:
         raise PreregistrationError(f"{path}: is missing, though its page or a later one is not; {_RESTORE}") from error
     except OSError as error:
         raise PreregistrationError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, AttributeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
         raise PreregistrationError(
             f"{path}: was edited, or is of another version of Recoil ({why}); {_RESTORE}"

@@ -96,7 +96,7 @@ def claim_folder(study: ReproducedStudy, out: Path) -> None:
     """Make `out` this study's: go on with the same, set aside another, refuse what is not a reproduction."""
     manifest, wanted = out / MANIFEST, study.manifest()
     if manifest.is_file():
-        if json.loads(manifest.read_text(encoding="utf-8")) == wanted:
+        if _manifest_values(manifest) == wanted:
             return
         storage.set_aside_file(out)
     elif out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -105,6 +105,15 @@ def claim_folder(study: ReproducedStudy, out: Path) -> None:
     for setup in study.answering if study.reconstructed else ():
         storage.write_whole(out / table_name(setup), answers_table(setup))
     storage.write_whole(manifest, (json.dumps(wanted, indent=1) + "\n").encode())
+
+
+def _manifest_values(manifest: Path) -> object:
+    """What the manifest of an earlier reproduction holds; `PlaceError` where that is no JSON."""
+    try:
+        return json.loads(storage.read_whole(manifest))
+    except (OSError, ValueError, RecursionError) as error:
+        rule = "is no manifest of a reproduction that can be read; move its folder away, or choose another --out"
+        raise folders.PlaceError(f"{manifest}: {rule}") from error
 
 
 def do_runs(study: ReproducedStudy, logs: Path, tell: Tell) -> None:
