@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import combinations
+
+from matplotlib.axis import Axis, Tick
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from analysis.report import page
 from analysis.report.figures import style
@@ -58,3 +64,19 @@ def drawn(*kinds: str) -> Iterator[None]:
     draw(*kinds)
     yield
     leave_out()
+
+
+def touching(figure: Figure) -> list[tuple[str, str]]:
+    """Texts of a figure that overlap; numbers beyond an axis' ends are not drawn."""
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    axis = [one for axes in figure.axes for one in (axes.xaxis, axes.yaxis)]
+    undrawn = {tick.label1 for one in axis for tick in one.get_major_ticks() if not _within(one, tick)}
+    texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    texts = [text for text in texts if text not in undrawn and (text.axes is None or text.axes.get_visible())]
+    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in texts]
+    return [(a, b) for (a, box), (b, other) in combinations(boxes, 2) if box.overlaps(other)]
+
+
+def _within(axis: Axis, tick: Tick) -> bool:
+    low, high = sorted(axis.get_view_interval())
+    return bool(low <= tick.get_loc() <= high)

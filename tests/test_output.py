@@ -10,13 +10,11 @@ import re
 import subprocess
 import unicodedata
 from collections.abc import Iterator
-from itertools import combinations
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -263,14 +261,6 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Figure]]:
         yield figures
 
 
-def _touching(figure: Figure) -> list[tuple[str, str]]:
-    """Texts that overlap."""
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
-    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in texts]
-    return [(a, b) for (a, box), (b, other) in combinations(boxes, 2) if box.overlaps(other)]
-
-
 WORDS = dict(
     zip(
         TEN,
@@ -294,7 +284,7 @@ def test_ten_methods_make_figures_in_which_nothing_that_is_written_touches(
         for draw in (figure_directions, figure_response_times, figure_conditional_accuracy):
             draw(ten.direction, tmp_path / "never")
     for figure in drawn:
-        assert _touching(figure) == []
+        assert figure_files.touching(figure) == []
         assert any(text.get_text().startswith("[1] a name") for text in figure.texts) is (labels is MIXED)
     assert len([axes for axes in drawn[0].axes if len(axes.patches) == 45]) == 2
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 from scipy.stats import norm
 
 from analysis.psychometric.people import PersonFit
 from analysis.psychometric.priors import default_priors
+from analysis.report.figures import style
+from analysis.report.labels import labelled
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.tracks import figure_tracks
@@ -20,6 +24,7 @@ from analysis.summary.thresholds import MOST_FITTED, Thresholds, priors_of, thre
 from experiments.design.config import DesignConfig
 from experiments.design.procedures.config import PosteriorConfig
 from experiments.load import load_setup
+from tests import figure_files
 from tests.designs import design
 from tests.tables_of_designs import loaded, simulated
 
@@ -229,6 +234,31 @@ def test_the_pages_have_groups_differences_people_and_a_panel_each(
     assert not any("below 0" in paragraph for paragraph in section.paragraphs)
     figure_functions(summary, summary.questions["response"].thresholds, tmp_path / "functions")  # type: ignore[arg-type]
     assert (tmp_path / "functions.png").is_file()
+
+
+@pytest.mark.parametrize("people", [1, 4, 6])
+@pytest.mark.parametrize("methods", [1, 2])
+def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
+    config: DesignConfig, people: int, methods: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: (style.lay_out(figure), shown.append(figure)))
+    table = answered(config, {(f"P{one}", method): 9.0 for one in range(people) for method in METHODS[:methods]}, 10)
+    summary = summarise(config, table)
+    found = summary.questions["response"].thresholds
+    assert found is not None
+    tracks = thresholds(load_setup("threshold").config, "response", table.assign(track=1))
+    assert tracks is not None
+    names = ["asymmetric force of one kind", "asymmetric force of another kind"]
+    with labelled(dict(zip(METHODS, names, strict=True))), figure_files.full_size():
+        figure_functions(summary, found, tmp_path / "never")
+        of_each = [replace(one, condition=method) for one in tracks.tracks for method in METHODS[:methods]]
+        figure_tracks(replace(tracks, tracks=tuple(of_each)), tmp_path / "never")
+    for figure in shown:
+        assert figure_files.touching(figure) == []
+        legends = [legend.get_window_extent() for legend in figure.legends]
+        assert len(legends) == methods - 1
+        assert all(0 <= box.x0 < box.x1 <= figure.bbox.width for box in legends)
 
 
 def test_an_interval_that_reaches_below_what_any_level_can_be_is_told() -> None:

@@ -178,11 +178,25 @@ def _write_key(figure: Figure, lines: Sequence[str]) -> None:
     key.set_y(share - above / (height + below))
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """One legend below all panels, of what `axes` has."""
+_LEGEND_LINE_IN = 0.19
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int, x_label: str = "") -> None:
+    """One legend below all panels, of what `axes` has; in fewer columns on a higher figure where it is too wide.
+
+    `x_label`, of all panels, stands above it: the layout would put `Figure.supxlabel` where the legend is.
+    """
     handles, names = axes.get_legend_handles_labels()
     where: Any = "outside lower center"
-    figure.legend(handles, names, loc=where, ncols=columns, frameon=False, fontsize=8.0, handlelength=3.2)
+    look: Any = {"loc": where, "frameon": False, "fontsize": 8.0, "handlelength": 3.2}
+    look |= {"title": x_label, "title_fontsize": 9.0} if x_label else {}
+    legend = figure.legend(handles, names, ncols=columns, **look)
+    give_fonts(figure)  # which its width is of
+    if columns > 1 and legend.get_window_extent().width > figure.bbox.width:
+        legend.remove()
+        more = -(-len(names) // (columns - 1)) + len(names) // -columns
+        figure.set_figheight(figure.get_figheight() + _LEGEND_LINE_IN * more)
+        legend_below(figure, axes, columns - 1, x_label)
 
 
 def method_colour(i: int) -> str:

@@ -162,10 +162,11 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
             axes.axvline(of.standard, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     grid[0].set_ylim(-3.0, 103.0)
     grid[0].xaxis.set_major_locator(MaxNLocator(4))
-    figure.supxlabel(factor_words(of.factor), fontsize=9.0)
     figure.supylabel(_LABELS[of.share], fontsize=9.0)
     if len(of.conditions) > 1:
         for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
             name = ", ".join(drawn_name(found.label(factor, level)) for factor, level in condition.levels.items())
             grid[0].plot([], [], **method_look(i), label=name)
-        legend_below(figure, grid[0], 3)
+        legend_below(figure, grid[0], 3, factor_words(of.factor))
+    else:
+        figure.supxlabel(factor_words(of.factor), fontsize=9.0)

@@ -26,6 +26,7 @@ from experiments.design.methods_section import factor_words
 MOST_TRACK_PANELS = 20
 """So many participants have a panel: a page is full."""
 _ACROSS, _WIDE_IN, _HIGH_IN = 4, 2.3, 1.8
+_X_LABEL = "trial of the track"
 
 
 def figure_tracks(of: Thresholds, path_stem: Path) -> None:
@@ -40,12 +41,13 @@ def figure_tracks(of: Thresholds, path_stem: Path) -> None:
             _draw(axes, [track for track in of.tracks if track.participant == who], conditions)
             _draw_threshold(axes, of, who)
         grid[0].xaxis.set_major_locator(MaxNLocator(4, integer=True))
-        figure.supxlabel("trial of the track", fontsize=9.0)
         figure.supylabel(factor_words(of.factor), fontsize=9.0)
         if len(conditions) > 1:
             for i, name in enumerate(conditions):
                 grid[0].plot([], [], color=method_colour(i), marker=method_marker(i), label=drawn_name(name))
-            legend_below(figure, grid[0], 3)
+            legend_below(figure, grid[0], 3, _X_LABEL)
+        else:
+            figure.supxlabel(_X_LABEL, fontsize=9.0)
 
 
 def _draw_threshold(axes: Axes, of: Thresholds, who: str) -> None:
