@@ -8,10 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from analysis.archive.bids_export import export
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import Logs, read_logs
+from analysis.summary.analyze import Request, analyze
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
+from tests import figure_files
 from tests.log_files import TextRow, trial_rows, write_study
 
 EXAMPLE = Path(__file__).parent.parent / "configs" / "examples" / "columns.toml"
@@ -144,6 +147,32 @@ scale_max = 7
     assert logs.ratings["trial"].tolist() == [1, 2, 3]
     assert set(logs.ratings["participant_id"]) == {"P07"}
     assert "line 2, column slider: rating 8 is out of range (rule: 1 to 7" in str(logs.problems[0])
+
+
+@pytest.mark.parametrize(("scale", "kept"), [("scale_min = 1\nscale_max = 7", False), ("", True)])
+def test_of_ratings_of_another_program_no_question_and_no_anchors_are_invented(
+    tmp_path: Path, scale: str, kept: bool
+) -> None:
+    columns = tmp_path / "map.toml"
+    columns.write_text(
+        'experiment = "preference"\n[participant]\nfile_name = "^([A-Za-z0-9]+)_"\n'
+        f'[columns]\nmethod = "method"\nrating = "slider"\n{f"[rating]{chr(10)}{scale}" if scale else ""}\n'
+    )
+    for code, ratings in (("P07", "147"), ("P08", "256"), ("P09", "346")):
+        rows = [[method, rating] for method, rating in zip(CONDITIONS, ratings, strict=True)]
+        _write(tmp_path / "old" / f"{code}_x.csv", rows, ("method", "slider"))
+    with figure_files.drawn("svg"):
+        analyze(Request(paths=[tmp_path / "old"], out=tmp_path / "out", columns=columns))
+    export(tmp_path / "old", tmp_path / "bids", columns=columns)
+    report, sidecar = (tmp_path / "out/report.md").read_text(), (tmp_path / "bids/task-preference_beh.json").read_text()
+    drawing = (tmp_path / "out/figures/figure-results.svg").read_text()
+    said = "Ratings went from 0 to 10;" if kept else "Ratings from 1 to 7 were rescaled linearly to 0 to 10;"
+    assert said in report
+    assert said in json.loads(sidecar)["TaskDescription"]
+    assert said in json.loads(sidecar)["rating"]["Description"]
+    assert ("rating, 0 to 10" if kept else "rating, 1 to 7 as 0 to 10") in drawing
+    assert not any("like" in text.replace("likelihood", "") for text in (sidecar, drawing))
+    assert "like very much" not in report
 
 
 def test_recoils_own_logs_may_lie_beside_them(tmp_path: Path) -> None:

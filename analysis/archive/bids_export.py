@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.archive import bids
-from analysis.logs.column_map import ColumnMap
+from analysis.logs.column_map import ColumnMap, scale_of_others
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.report import placing
@@ -71,7 +71,8 @@ def export(
     logs = read_logs([folder], track, mapping, include_synthetic=include_synthetic)
     refuse_nothing([folder], logs)
     results = results_of(folder, logs)
-    runs, files = data_set_of(logs, members_of(results), name_of(results), free_text=free_text)
+    rated = mapping.rated_from if mapping is not None else None
+    runs, files = data_set_of(logs, members_of(results), name_of(results), free_text=free_text, rated_from=rated)
     with placing.in_place(target, lambda: _earlier(target)) as part:
         for path, data in (files | filled_in(earlier, files)).items():
             placing.write_file(part, path, data)
@@ -91,11 +92,31 @@ def export(
 
 
 def data_set_of(
-    logs: Logs, members: Mapping[str, Member], name: str, *, free_text: bool = False
+    logs: Logs,
+    members: Mapping[str, Member],
+    name: str,
+    *,
+    free_text: bool = False,
+    rated_from: tuple[float, float] | None = None,
 ) -> tuple[bids.Runs, dict[str, bytes]]:
-    """The runs in logs, of every kind of data that they hold, and the files of the data set that they make."""
+    """The runs in logs, of every kind of data that they hold, and the files of the data set that they make.
+
+    `rated_from`: the ends of the scale of ratings that other programs recorded.
+    """
     runs = bids.runs_of(logs, *logs.apart, shots=measured_shots(logs))
+    if rated_from is not None and any(part.mapped for part in (logs, *logs.apart)):
+        runs = replace(runs, runs=tuple(_rated_otherwise(run, rated_from) for run in runs.runs))
     return runs, bids.data_set(runs, members, name, recoil_version(), free_text=free_text)
+
+
+def _rated_otherwise(run: bids.Run, rated_from: tuple[float, float]) -> bids.Run:
+    """A run of ratings without the question and the words of the scale that Recoil's own have."""
+    if run.experiment != "preference":
+        return run
+    said = scale_of_others(rated_from)
+    about = f"{said.rstrip('.')}; 0 is a rating, empty means none was given"
+    columns = [replace(one, description=about) if one.name == "rating" else one for one in run.columns]
+    return replace(run, task=f"Each rendering method is presented and then rated. {said}", columns=tuple(columns))
 
 
 def measured_shots(logs: Logs) -> dict[tuple[str, str], tuple[Row, ...]]:

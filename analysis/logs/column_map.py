@@ -81,6 +81,18 @@ class ScaleMapping(Model):
         return self
 
 
+def scale_of_others(ends: tuple[float, float]) -> str:
+    """What there is to say of another program's ratings: their question and what the ends mean are in no log.
+
+    >>> scale_of_others((1.0, 7.0)).partition(";")[0]
+    'Ratings from 1 to 7 were rescaled linearly to 0 to 10'
+    """
+    low, high = ends
+    as_they_are = (low, high) == (0.0, 10.0)
+    came = "went from 0 to 10" if as_they_are else f"from {low:g} to {high:g} were rescaled linearly to 0 to 10"
+    return f"Ratings {came}; the logs are another program's and tell neither the question nor what the ends mean."
+
+
 class Skip(Model):
     """Rows to leave out."""
 
@@ -141,6 +153,13 @@ class ColumnMap(Model):
     response_time: ResponseTimeMapping | None = None
     rating: ScaleMapping | None = None
     skip: tuple[Skip, ...] = ()
+
+    @property
+    def rated_from(self) -> tuple[float, float] | None:
+        """The ends of the scale of another program's ratings; `None` of other answers."""
+        if self.experiment != "preference":
+            return None
+        return (0.0, 10.0) if self.rating is None else (self.rating.scale_min, self.rating.scale_max)
 
     @property
     def named(self) -> tuple[str, ...]:

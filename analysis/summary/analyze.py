@@ -154,7 +154,7 @@ def _analysis(
     statistics = replace(
         main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None, warnings=warnings
     )
-    told = _told(main)
+    told = _told(main, files.mapping)
     compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))
     report = replace(
         told,
@@ -165,9 +165,8 @@ def _analysis(
         comparison=compared,
         beside=tuple(main.tables),
         provenance=provenance() | _read_by(request.columns, files.mapping),
-        rated_from=_rating_ends(logs, files.mapping),
         extra=(*request.extra, *told.extra),
-        apart=tuple(_told(one) for one in others),
+        apart=tuple(_told(one, files.mapping) for one in others),
     )
     return report, (main, *others), edited
 
@@ -267,7 +266,7 @@ def _with_frozen(statistics: StudyStatistics, logs: Logs) -> tuple[StudyStatisti
     return replace(statistics, requested=tuple(found) or None, warnings=said), tuple(made)
 
 
-def _told(one: _Analysed) -> ReportData:
+def _told(one: _Analysed, mapping: ColumnMap | None) -> ReportData:
     """What is told of data of one kind."""
     coded = one.statistics.remarks
     registered = ((one.logs.person(where, member.participant_id), member) for where, member in one.logs.joined)
@@ -278,6 +277,7 @@ def _told(one: _Analysed) -> ReportData:
         dropped=tuple(_notes(one.effect)),
         extra=() if coded is None else (remarks_coding.coding_section(coded),),
         planned=not one.logs.mapped,
+        rated_from=mapping.rated_from if mapping is not None and one.logs.mapped else None,
         members=dict(registered),
         analysed=who_is_analysed(one.statistics, one.logs),
         delivered=() if one.logs.mapped else delivered_courses(one.logs.files),
@@ -337,13 +337,6 @@ def _notes(effect: ExclusionEffect | None) -> list[str]:
         recorded = effect.trials[experiment].recorded
         notes.append(f"Trials dropped by rule in {experiment}, of {recorded}: {shown}.")
     return notes
-
-
-def _rating_ends(logs: Logs, mapping: ColumnMap | None) -> tuple[float, float]:
-    """The ends of the scale that ratings were given on."""
-    if not logs.mapped or mapping is None or mapping.rating is None:
-        return 0.0, 10.0
-    return mapping.rating.scale_min, mapping.rating.scale_max
 
 
 def _read_by(path: Path | None, mapping: ColumnMap | None) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -71,13 +71,14 @@ _PANELS = (
 )
 
 
-def figure_8(statistics: StudyStatistics, path_stem: Path) -> None:
+def figure_8(statistics: StudyStatistics, path_stem: Path, rated_from: tuple[float, float] | None = None) -> None:
     """Bars (mean, SD), participants as points and lines, brackets from the Tukey tests; PNG, SVG and PDF are written.
 
-    An experiment without a complete participant gets no panel. `ValueError` if none is left.
+    An experiment without a complete participant gets no panel. `ValueError` if none is left. `rated_from`: the ends of
+    the scale of another program's ratings, of which nobody knows what they meant.
     """
     found = statistics.analysed
-    panels = [panel for panel in _PANELS if panel.experiment in found]
+    panels = [_rated_otherwise(panel, rated_from) for panel in _PANELS if panel.experiment in found]
     if not panels:
         raise ValueError("figure 8 needs an experiment with at least one complete participant")
     widest = max(len(found[panel.experiment].methods) for panel in panels)
@@ -89,6 +90,15 @@ def figure_8(statistics: StudyStatistics, path_stem: Path) -> None:
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for i, (axes, panel) in enumerate(zip(row, panels, strict=True)):
             _draw_panel(axes, panel, found[panel.experiment], chr(ord("a") + i))
+
+
+def _rated_otherwise(panel: _Panel, rated_from: tuple[float, float] | None) -> _Panel:
+    """A panel of ratings with what is known of another program's scale."""
+    if rated_from is None or panel.experiment != "preference":
+        return panel
+    low, high = rated_from
+    as_they_are = (low, high) == (0.0, 10.0)
+    return replace(panel, label="rating, 0 to 10" if as_they_are else f"rating, {low:g} to {high:g} as 0 to 10")
 
 
 def has_matrix(found: WithinStatistics) -> bool:

@@ -36,8 +36,8 @@ class ReportData:
     trials; `extra` are finished sections that follow the results; the participants may be `reconstructed` from the
     published numbers. `planned`: the logs come with their plans, as those of other programs do not. `members` is what
     the register says of people, `analysed` by experiment whose answers count. `apart`: the same of data of other kinds,
-    which are kept apart. `rated_from`: the ends of the scale of other programs' ratings, which became 0 and 10.
-    `delivered`: what sensors measured of the shots.
+    which are kept apart. `rated_from`: the ends of the scale of other programs' ratings, which became 0 and 10;
+    `None`: question and scale are Recoil's own. `delivered`: what sensors measured of the shots.
     """
 
     title: str
@@ -55,7 +55,7 @@ class ReportData:
     extra: tuple[Section, ...] = ()
     reconstructed: bool = False
     planned: bool = True
-    rated_from: tuple[float, float] = (0.0, 10.0)
+    rated_from: tuple[float, float] | None = None
     members: Mapping[str, Member] = field(default_factory=dict)
     analysed: Mapping[str, Sequence[str]] = field(default_factory=dict)
     apart: tuple[ReportData, ...] = ()

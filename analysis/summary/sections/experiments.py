@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
+from analysis.logs.column_map import scale_of_others
 from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.labels import display_name
@@ -285,6 +286,9 @@ def direction_section(report: ReportData) -> Iterator[Section]:
     )
 
 
+_OWN_SCALE = "Ratings went from 0 (dislike very much) to 10 (like very much)."
+
+
 def preference_section(report: ReportData) -> Iterator[Section]:
     """Experiment 2: ratings and planned comparisons."""
     found = report.statistics.preference
@@ -292,7 +296,7 @@ def preference_section(report: ReportData) -> Iterator[Section]:
         return
     yield Section(
         title="Preference",
-        paragraphs=("Ratings went from 0 (dislike very much) to 10 (like very much).",),
+        paragraphs=(_OWN_SCALE if report.rated_from is None else scale_of_others(report.rated_from),),
         tables=(preference_means(found), *tukey_tables(found, "preference", planned=report.planned)),
     )
 

@@ -89,8 +89,8 @@ _HANDS = {"right": "right-handed", "left": "left-handed", "both": "ambidextrous"
 def _design(report: ReportData, found: WithinStatistics) -> str:
     methods = f"{len(found.methods)} rendering methods ({', '.join(map(display_name, found.methods))})"
     if not isinstance(found, DirectionStatistics):
-        low, high = report.rated_from
-        rescaled = "" if report.rated_from == (0.0, 10.0) else ". Ratings were rescaled linearly to 0 to 10"
+        low, high = report.rated_from or (0.0, 10.0)
+        rescaled = "" if (low, high) == (0.0, 10.0) else ". Ratings were rescaled linearly to 0 to 10"
         return f"Within participants, each of {methods} was rated from {low:g} to {high:g}{rescaled}."
     return f"{_shots(found, methods)}. The measure was the share of right answers on forward shots."
 

@@ -46,7 +46,7 @@ def write_figures(folder: Path, report: ReportData) -> None:
     if report.panels:
         figure_5(report.panels, folder / _SHOT_FIGURE)
     if statistics.analysed:
-        figure_8(statistics, folder / _RESULTS_FIGURE)
+        figure_8(statistics, folder / _RESULTS_FIGURE, report.rated_from)
     if direction is not None and direction.n:
         _write_direction(folder, direction)
     for name, one in statistics.designs.items():
