@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,20 @@ def test_where_nobody_has_a_threshold_among_the_levels_no_mean_is_told(lab: Path
     (lab / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *rows]) + "\n")
     (told,) = thresholds_in_short(mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")).items
     assert told == "Threshold in voltage in V, mean over people: links: nobody has one within the levels."
+
+
+@pytest.mark.parametrize(
+    ("exponent", "shown"),
+    [("E-12", r"\d\.\d\de−11 \["), ("E+20", r"\d\.\d\de\+21 \["), ("", r"\b1?\d\.\d\d \[")],
+)
+def test_levels_of_every_size_are_told_in_three_figures(lab: Path, exponent: str, shown: str) -> None:
+    text = (lab / "lab.csv").read_text()
+    (lab / "lab.csv").write_text(re.sub(r"(\d+,5);", rf"\g<1>{exponent};", text))
+    (told,) = thresholds_in_short(mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")).items
+    assert re.search(f"mean over people: links: {shown}", told)
+    page = (lab / "out" / "report.md").read_text()
+    assert "0.000000000" not in page
+    assert not re.search(r"\d{13}", page.partition("## What this rests on")[0])
 
 
 def test_a_level_that_is_not_there_is_a_trial_without_a_stimulus(lab: Path) -> None:

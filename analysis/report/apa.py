@@ -26,6 +26,17 @@ def number(value: float | None, digits: int = 2) -> str:
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
 
 
+def figures(value: float | None) -> str:
+    """`value` with three significant figures, where decimals would be zeros alone or hundreds of digits.
+
+    >>> figures(-1.2345e-12), figures(1e300), figures(None)
+    ('−1.23e−12', '1e+300', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return NO_NUMBER
+    return f"{value:.3g}".replace("-", "−")
+
+
 def below_one(value: float | None) -> str:
     """A number that cannot pass 1, without a leading zero.
 

@@ -47,13 +47,13 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
         yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over people: {shown}{more}."
 
 
-def _group_words(one: ConditionFit, digits: int) -> str:
+def _group_words(one: ConditionFit, digits: int | None) -> str:
     if one.group is None:
         return ""
     if one.group.without == one.group.people:
         return "nobody has one within the levels"
-    jnd = apa.number(one.group.jnd.median, digits)
-    return f"{apa.number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}"
+    jnd = _number(one.group.jnd.median, digits)
+    return f"{_number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}"
 
 
 def _measure(of: Thresholds) -> str:
@@ -178,7 +178,7 @@ def threshold_words(found: DesignSummary, of: Thresholds) -> Iterator[str]:
         if one.group is not None:
             yield f"{_condition(found, one.levels)}{_group_words(one, _digits(of))}"
         elif one.people and (fit := one.people[0].fit) is not None:
-            shown = one.people[0].reason or apa.number(fit.threshold.median, _digits(of))
+            shown = one.people[0].reason or _number(fit.threshold.median, _digits(of))
             yield f"{_condition(found, one.levels)}{shown}"
 
 
@@ -200,7 +200,7 @@ def _tables(asked: str, found: DesignSummary, of: Thresholds) -> Iterator[Table]
     yield _people(asked, found, of, digits)
 
 
-def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
+def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int | None) -> Table:
     conditions = ("Condition",) if of.conditions[0].levels else ()
     measured = f"{_measure(of).capitalize()}, mean", "95 % interval", "SD", "JND", "95 % interval"
     return Table(
@@ -211,7 +211,7 @@ def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Ta
                 *_cells(found, one.levels),
                 str(one.group.people),
                 *_estimate(one.group.threshold, digits),
-                apa.number(one.group.sd.median, digits),
+                _number(one.group.sd.median, digits),
                 *_estimate(one.group.jnd, digits),
                 str(one.group.without),
             )
@@ -221,7 +221,7 @@ def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Ta
     )
 
 
-def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
+def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int | None) -> Table:
     return Table(
         caption=f"{asked}: differences of the {_measure(of)}; without correction for their number",
         header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
@@ -237,7 +237,7 @@ def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int) 
     )
 
 
-def _people(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Table:
+def _people(asked: str, found: DesignSummary, of: Thresholds, digits: int | None) -> Table:
     guessed = of.guess is None
     rows = tuple(
         (one.participant, *_cells(found, condition.levels), f"{one.trials:,}", *_own(one, digits, guessed=guessed))
@@ -259,13 +259,13 @@ def _people(asked: str, found: DesignSummary, of: Thresholds, digits: int) -> Ta
     )
 
 
-def _own(one: PersonFit, digits: int, *, guessed: bool) -> tuple[str, ...]:
+def _own(one: PersonFit, digits: int | None, *, guessed: bool) -> tuple[str, ...]:
     fit = one.fit
     if fit is None:
         return (*(apa.NO_NUMBER,) * (8 + guessed), one.reason or "")
     return (
         *_estimate(fit.threshold, digits),
-        apa.number(None if one.pooled is None else one.pooled.median, digits),
+        _number(None if one.pooled is None else one.pooled.median, digits),
         *_estimate(fit.jnd, digits),
         f"{fit.slope.median:.3g}".replace("-", "−"),
         apa.below_one(fit.lapse.median),
@@ -275,16 +275,29 @@ def _own(one: PersonFit, digits: int, *, guessed: bool) -> tuple[str, ...]:
     )
 
 
-def _estimate(found: Credible, digits: int) -> tuple[str, str]:
-    return apa.number(found.median, digits), _ends(found, digits)
+def _estimate(found: Credible, digits: int | None) -> tuple[str, str]:
+    return _number(found.median, digits), _ends(found, digits)
 
 
-def _ends(found: Credible, digits: int) -> str:
-    return apa.interval(found.low, found.high, digits)
+def _ends(found: Credible, digits: int | None) -> str:
+    return f"[{_number(found.low, digits)}, {_number(found.high, digits)}]"
 
 
-def _digits(of: Thresholds) -> int:
-    """So many decimals that the span of the levels has three figures."""
+def _number(value: float | None, digits: int | None) -> str:
+    return apa.figures(value) if digits is None else apa.number(value, digits)
+
+
+_SMALL, _LARGE = 1e-4, 1e6
+"""Levels that span less or more than this have decimals that nobody reads."""
+
+
+def _digits(of: Thresholds) -> int | None:
+    """So many decimals that the span of the levels has three figures; `None`: three figures, with an exponent.
+
+    Of a narrow span far from 0 three figures would be the same at every level: there decimals stay.
+    """
     levels = [point.level for one in of.conditions for point in one.points]
-    span = max(levels) - min(levels)
+    span, largest = max(levels) - min(levels), max(map(abs, levels))
+    if span > _LARGE or (0 < span < _SMALL and largest < 10 * span):
+        return None
     return min(max(2 - math.floor(math.log10(span)), 0), 9) if span > 0 else 2
