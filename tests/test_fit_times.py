@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from analysis.predict.fit.times import TimesRequest, lapse_range, times
+from analysis.predict.fit.times import TimesRequest, in_short, lapse_range, times
 from analysis.report.terminal import unseen
 from analysis.times.first_passage import distribution
 from analysis.times.fit import answered_by, fit
@@ -20,6 +21,7 @@ from experiments.load import load_setup
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from tests import figure_files
 from tests.conftest import Recoil
 from tests.decisions import decide_all, made
 from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
@@ -84,6 +86,32 @@ def test_known_parameters_are_found_again_within_their_intervals(logs: Path, rec
 
 
 @pytest.mark.slow
+def test_methods_of_a_map_stand_in_its_order_under_its_labels_wherever_they_are_told(tmp_path: Path) -> None:
+    codes = {"vibration": "weak", "asymmetric-1": "mid", "asymmetric-2": "strong"}
+    rows = [row | {"method": codes[row["method"]]} for seed in (1, 2) for row in decided(f"P{seed:02d}", seed)]
+    names = ("participant_id", "method", "direction", "response", "response_time_s")
+    lines = [",".join(row[name] for name in names) for row in rows]
+    (tmp_path / "lab.csv").write_text("\n".join(["who,condition,shot,key,rt", *lines]) + "\n")
+    (tmp_path / "map.toml").write_text(
+        'experiment = "direction"\n[participant]\ncolumn = "who"\n[response_time]\nunit = "s"\n[columns]\n'
+        'method = "condition"\ndirection = "shot"\nresponse = "key"\nresponse_time = "rt"\n[method]\n'
+        'levels = ["weak", "mid", "strong"]\nlabels = {weak = "Zephyr", mid = "Breeze", strong = "Gale"}\n'
+    )
+    request = TimesRequest(paths=[tmp_path / "lab.csv"], columns=tmp_path / "map.toml", profiled=True)
+    with figure_files.drawn("svg"):
+        found = times(request, tmp_path / "out", iter, unseen)
+    assert found.fit.methods == ("weak", "mid", "strong")
+    for estimates_of in (found.fit.main_estimates, found.fit.together.estimates, found.fit.each["P01"].estimates):
+        assert [one.name for one in estimates_of][:3] == ["drift weak", "drift mid", "drift strong"]
+    told = "\n".join(in_short(found.fit, found.labels).items)
+    drawing = (tmp_path / "out/figures/times.svg").read_text()
+    page = (tmp_path / "out/report.md").read_text()
+    for text in (told, drawing, page):
+        places = [text.index(label) for label in ("Zephyr", "Breeze", "Gale")]
+        assert places == sorted(places)
+        assert not re.search(r"\b(weak|mid|strong)\b", text)
+
+
 def test_a_log_without_instructions_has_one_boundary(tmp_path: Path, recoil: Recoil) -> None:
     rows = [{key: value for key, value in row.items() if key != "instruction"} for row in decided("P01", 1)]
     write_rows(trials_path(tmp_path / "logs", "P01"), rows, header=list(rows[0]))

@@ -304,5 +304,6 @@ def times(
     missing = [*map(str, done.problems), *feature.left_out(done.fit)]
     for line in few_of_each([*(f"left out: {one}" for one in missing), *map(str, done.remarks)]):
         terminal.say(f"recoil: {line}")
-    terminal.show(done.fit, f"{terminal.in_text(feature.in_short(done.fit))}\nReport: {out / 'report.html'}", as_json)
+    short = terminal.in_text(feature.in_short(done.fit, done.labels))
+    terminal.show(done.fit, f"{short}\nReport: {out / 'report.html'}", as_json)
     raise terminal.end(exceptions=bool(missing or done.remarks))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,17 +13,19 @@ import numpy as np
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.files import Problem, below
 from analysis.logs.kinds import OF_KIND, folder_of
+from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs, Track, read_logs
 from analysis.predict.fit.figures import TimesPanel, figure_times
 from analysis.predict.fit.percept import NO_OWN_TIMES
 from analysis.predict.fit.times_results import EZCell, FittedTimes, TimesFit, times_fit
 from analysis.report import apa, placing
-from analysis.report.labels import display_name, labelled, named
+from analysis.report.labels import display_name, labelled
 from analysis.report.page import write_page
 from analysis.report.section import PageHead, PageNotice, Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.stats.arrays import FloatArray
+from analysis.summary.summary import METHOD_ORDER
 from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by, fit, profile
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
@@ -53,9 +55,13 @@ class TimesRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoundTimes:
-    """What was found, the logs that were left out, and what there is to say of logs that were used."""
+    """What was found, the logs that were left out, and what there is to say of logs that were used.
+
+    `labels`: what the methods are called in print.
+    """
 
     fit: TimesFit
+    labels: Mapping[str, str]
     problems: tuple[Problem, ...]
     remarks: tuple[Problem, ...]
 
@@ -77,7 +83,7 @@ def times(request: TimesRequest, out: Path, track: Track, progress: Progress) ->
                 _fit_of(part, lapses, request, folder / folder_of(part.kind), progress)
             except PlaceError as error:
                 problems.append(Problem(file=part.files[0].parent, line=None, column=None, message=str(error)))
-    return FoundTimes(fit=found, problems=tuple(problems), remarks=logs.remarks)
+    return FoundTimes(fit=found, labels=logs.methods.labels, problems=tuple(problems), remarks=logs.remarks)
 
 
 def _fit_of(logs: Logs, lapses: bool | LapseRange, request: TimesRequest, out: Path, progress: Progress) -> TimesFit:
@@ -130,7 +136,8 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     if not len(logs.trials):
         reasons = [str(one) for one in (*logs.problems, *logs.begun)]
         raise PlaceError("\n".join([f"no usable log of experiment 1 in {where}", *reasons]))
-    methods = [str(name) for name in logs.trials["method"].cat.categories]
+    names = logs.methods.and_then(MethodNames(order=METHOD_ORDER))
+    methods = names.ordered(map(str, logs.trials["method"].cat.categories))
     own = own_trials(logs.trials, methods)
     if not own.time_s.size:
         reasons = [f"{count} trials: {REFUSALS[name]}" for name, count in own.refused.items()]
@@ -178,12 +185,13 @@ _LIKELY = 0.995
 _POINTS = 200
 
 
-def in_short(found: TimesFit) -> Section:
-    """What a reader looks for, in a few lines."""
-    return Section(
-        title=f"The diffusion model fitted to {found.trials} trials of {_people_count(found)}",
-        items=tuple(_lines(found)),
-    )
+def in_short(found: TimesFit, labels: Mapping[str, str]) -> Section:
+    """What a reader looks for, in a few lines, the methods under their labels."""
+    with labelled(labels):
+        return Section(
+            title=f"The diffusion model fitted to {found.trials} trials of {_people_count(found)}",
+            items=tuple(_lines(found)),
+        )
 
 
 def _lines(found: TimesFit) -> Iterator[str]:
@@ -197,13 +205,14 @@ def _lines(found: TimesFit) -> Iterator[str]:
 
 
 def _estimate_line(one: MeanEstimate | Estimate) -> str:
-    return f"{one.name:26} {apa.number(one.value, 3):>7} {_interval(one)}"
+    return f"{_parameter(one.name):26} {apa.number(one.value, 3):>7} {_interval(one)}"
 
 
 def _undetermined(found: TimesFit) -> Iterator[str]:
     """Parameters whose likelihood is flat."""
     for name in found.together.unidentified:
-        yield f"The data do not determine {name}: other values of it fit as well, so that it has no interval."
+        what = _parameter(name)
+        yield f"The data do not determine {what}: other values of it fit as well, so that it has no interval."
 
 
 def left_out(found: TimesFit) -> Iterator[str]:
@@ -264,7 +273,7 @@ def _estimates(found: TimesFit, remarks: Sequence[Problem]) -> Section:
 
 def _profiles(profiles: dict[str, tuple[float, float]]) -> list[Table]:
     """Of all together, where they were asked for; an end that is never reached is a dash."""
-    rows = tuple((name, apa.interval(low, high, 3)) for name, (low, high) in profiles.items())
+    rows = tuple((_parameter(name), apa.interval(low, high, 3)) for name, (low, high) in profiles.items())
     caption = "Likelihood intervals of all together, 95 %; as if people were alike"
     return [Table(caption=caption, header=("Parameter", "95 % CI"), rows=rows)] if rows else []
 
@@ -272,7 +281,7 @@ def _profiles(profiles: dict[str, tuple[float, float]]) -> list[Table]:
 def _parameter(name: str) -> str:
     """A parameter with its method by its label."""
     kind, _, of = name.partition(" ")
-    return f"{kind} {named(of, words=True)}" if of else kind
+    return f"{kind} {display_name(of)}" if of and kind == "drift" else name
 
 
 def _mean_cells(mean: MeanEstimate | None) -> list[str]:
@@ -398,7 +407,7 @@ def _with_interval(one: MeanEstimate | Estimate, digits: int) -> str:
 
 def _people(found: TimesFit) -> Section:
     names = [one.name for one in found.together.estimates]
-    rows = []
+    header, rows = ("Participant", "Trials", *map(_parameter, names)), []
     for who, one in list(found.each.items())[:SHOWN_PEOPLE]:
         own = {estimate.name: _with_interval(estimate, 2) for estimate in one.estimates}
         rows.append((who, str(one.trials), *(own.get(name, apa.NO_NUMBER) for name in names)))
@@ -406,7 +415,7 @@ def _people(found: TimesFit) -> Section:
     return Section(
         title="Person by person",
         paragraphs=("Each person's own fit [95 % CI]" + (f"; {more} more people are in fit.json." if more else "."),),
-        tables=(Table(caption="Own fits", header=("Participant", "Trials", *names), rows=tuple(rows)),),
+        tables=(Table(caption="Own fits", header=header, rows=tuple(rows)),),
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -96,11 +97,12 @@ def times_fit(fitted: FittedTimes, logs: Logs, lapses: str, *, bias: bool) -> Ti
     """The content of `fit.json`; `lapses` and `bias` as they were asked for."""
     own, each = fitted.own, fitted.each
     people = tuple(sorted({own.people[code] for code in own.person.tolist()}))
-    together = {field.name: getattr(fitted.together, field.name) for field in fields(DiffusionFit)}
+    whole = _in_order(fitted.together, own.methods)
+    together = {field.name: getattr(whole, field.name) for field in fields(DiffusionFit)}
     return TimesFit(
         files=tuple(name.as_posix() for name in names_below(logs.files).values()),
         people=people,
-        methods=tuple(sorted({own.methods[place] for place in own.method.tolist()})),
+        methods=tuple(own.methods[place] for place in np.unique(own.method)),
         instructions=tuple(fitted.trials.instructions),
         trials=own.time_s.size,
         answered=own.answered,
@@ -108,13 +110,26 @@ def times_fit(fitted: FittedTimes, logs: Logs, lapses: str, *, bias: bool) -> Ti
         lapses=lapses,
         bias=bias,
         together=TogetherFit(**together, profiles=fitted.profiles),
-        mean_of_people=None if each is None else each.means,
-        each={} if each is None else dict(zip(people, each.fits, strict=True)),
+        mean_of_people=None if each is None else _drifts_in_order(each.means, own.methods),
+        each={} if each is None else dict(zip(people, (_in_order(one, own.methods) for one in each.fits), strict=True)),
         left_out=() if each is None else tuple(people[place] for place in each.left_out),
         ez=tuple(_ez(own)),
         provenance=provenance(),
         data_kind=logs.kind,
     )
+
+
+SomeEstimate = TypeVar("SomeEstimate", bound=Estimate)
+
+
+def _in_order(found: DiffusionFit, methods: Sequence[str]) -> DiffusionFit:
+    return replace(found, estimates=_drifts_in_order(found.estimates, methods))
+
+
+def _drifts_in_order(estimates: Sequence[SomeEstimate], methods: Sequence[str]) -> tuple[SomeEstimate, ...]:
+    """The drifts in the order of the methods, which the fit has in that of the alphabet; the others behind."""
+    places = {f"drift {method}": place for place, method in enumerate(methods)}
+    return tuple(sorted(estimates, key=lambda one: places.get(one.name, len(places))))
 
 
 def _ez(own: OwnTrials) -> Iterator[EZCell]:
