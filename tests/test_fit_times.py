@@ -112,6 +112,19 @@ def test_methods_of_a_map_stand_in_its_order_under_its_labels_wherever_they_are_
         assert not re.search(r"\b(weak|mid|strong)\b", text)
 
 
+@pytest.mark.parametrize("profiled", [False, True])
+def test_that_the_best_share_of_lapses_is_none_is_no_want_of_data(tmp_path: Path, profiled: bool) -> None:
+    request = TimesRequest(paths=[study(tmp_path / "logs", people=3)], lapses="0.2-60", profiled=profiled)
+    found = times(request, tmp_path / "out", iter, unseen)
+    (said,) = (line for line in in_short(found.fit, found.labels).items if "lapses" in line)
+    assert said.startswith(
+        "The share of lapses that fits best is none, the end of its range, so that it has no standard"
+    )
+    limit = f"is {found.fit.together.profiles['lapse'][1]:.3f}." if profiled else "; --profile gives its upper limit."
+    assert said.endswith(limit)
+    assert "do not determine lapse" not in (tmp_path / "out/report.md").read_text()
+
+
 def test_a_log_without_instructions_has_one_boundary(tmp_path: Path, recoil: Recoil) -> None:
     rows = [{key: value for key, value in row.items() if key != "instruction"} for row in decided("P01", 1)]
     write_rows(trials_path(tmp_path / "logs", "P01"), rows, header=list(rows[0]))

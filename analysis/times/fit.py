@@ -53,6 +53,7 @@ class Estimate:
 class DiffusionFit:
     """A fitted model. `unidentified` names parameters on which the data have no grip.
 
+    Lapses whose best share is none are among them: at the end of its range it has no standard error, though a limit.
     With a `reason` the fit failed and has no intervals.
     """
 
@@ -200,7 +201,7 @@ def information(model: DiffusionLikelihood, at: FloatArray) -> FloatArray:
 
 
 def _covariance(model: DiffusionLikelihood, at: FloatArray, *, by_person: bool) -> tuple[FloatArray, tuple[str, ...]]:
-    """Covariance of the coordinates (NaN where there is none) and the names that the data do not tell."""
+    """Covariance of the coordinates (NaN where there is none) and the names that have none."""
     matrix = information(model, at)
     seen = np.ones(at.size, dtype=np.bool_)
     if model.lapses and scipy.special.expit(at[-1]) < EDGE:

@@ -26,7 +26,7 @@ from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.stats.arrays import FloatArray
 from analysis.summary.summary import METHOD_ORDER
-from analysis.times.fit import AnsweredBy, DiffusionFit, Estimate, answered_by, fit, profile
+from analysis.times.fit import EDGE, AnsweredBy, DiffusionFit, Estimate, answered_by, fit, profile
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import FEWEST_TRIALS, MeanEstimate, as_trials, fit_people
@@ -209,10 +209,21 @@ def _estimate_line(one: MeanEstimate | Estimate) -> str:
 
 
 def _undetermined(found: TimesFit) -> Iterator[str]:
-    """Parameters whose likelihood is flat."""
+    """Parameters whose likelihood is flat, and lapses whose best share is none."""
     for name in found.together.unidentified:
-        what = _parameter(name)
-        yield f"The data do not determine {what}: other values of it fit as well, so that it has no interval."
+        if name == "lapse" and found.together[name].value < EDGE:
+            yield _without_lapses(found.together.profiles)
+        else:
+            what = _parameter(name)
+            yield f"The data do not determine {what}: other values of it fit as well, so that it has no interval."
+
+
+def _without_lapses(profiles: Mapping[str, tuple[float, float]]) -> str:
+    """What there is to say of a share of lapses at 0, the end of its range: its likelihood falls on one side alone."""
+    best = "The share of lapses that fits best is none, the end of its range, so that it has no standard error"
+    if "lapse" not in profiles:
+        return f"{best}; --profile gives its upper limit."
+    return f"{best}; the upper limit by its likelihood is {apa.number(profiles['lapse'][1], 3)}."
 
 
 def left_out(found: TimesFit) -> Iterator[str]:
