@@ -124,6 +124,30 @@ def test_semicolons_decimal_commas_milliseconds_and_another_encoding(tmp_path: P
     assert logs.trials["response_time_s"].tolist() == pytest.approx(expected)
 
 
+NO_NUMBERS = ["5_04", "nan", "NaN", "inf", "1e999", "٥"]
+"""What Python reads as a number and no log means by one."""
+
+
+@pytest.mark.parametrize("unit", ["s", "ms"])
+@pytest.mark.parametrize("cell", NO_NUMBERS)
+def test_a_time_that_python_alone_reads_as_a_number_is_refused(tmp_path: Path, cell: str, unit: str) -> None:
+    rows = _psychopy(trial_rows())
+    rows[5][HEADER.index("key_resp.rt")] = cell
+    text = EXAMPLE.read_text(encoding="utf-8").replace('unit = "s"', f'unit = "{unit}"')
+    (problem,) = _read(_write(tmp_path / "old.csv", rows), text).problems
+    assert f"{cell!r} is not a finite number with a decimal point" in problem.message
+    assert problem.line == 7
+
+
+@pytest.mark.parametrize("scale", ["", "[rating]\nscale_min = 1\nscale_max = 7"])
+@pytest.mark.parametrize("cell", NO_NUMBERS)
+def test_a_rating_that_python_alone_reads_as_a_number_is_refused(tmp_path: Path, cell: str, scale: str) -> None:
+    text = f'experiment = "preference"\n[text]\nmissing = [""]\n[participant]\nfile_name = "^(P07)_"\n{scale}\n'
+    _write(tmp_path / "old" / "P07_x.csv", [["vibration", "1"], ["asymmetric-1", cell]], ("method", "slider"))
+    (problem,) = _read(tmp_path / "old", f'{text}[columns]\nmethod = "method"\nrating = "slider"').problems
+    assert f"{cell!r} is not a finite number with a decimal point" in problem.message
+
+
 def test_ratings_on_another_scale_and_a_code_from_the_files_name(tmp_path: Path) -> None:
     text = """
 experiment = "preference"

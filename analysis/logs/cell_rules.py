@@ -44,13 +44,23 @@ def experiment_of(header: Sequence[str]) -> str:
     return experiment
 
 
+def number_in(text: str) -> float | None:
+    """The finite number in a text; `None` if it is none, which Python's own reading of `5_04` or `nan` is not.
+
+    >>> number_in("5.04"), number_in("5_04"), number_in("nan")
+    (5.04, None, None)
+    """
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else None
+
+
 def cell_fault(column: Column, text: str) -> str:
     """Why a column may not hold a text; empty if it may."""
     if text == tables.MISSING:
         return "the cell is empty (rule: a value is required)" if column.required else ""
     if column.type == "integer" and not _INTEGER.fullmatch(text):
         return f"{quoted(text)} is not a whole number of at most 15 digits"
-    if column.type == "number" and not (_NUMBER.fullmatch(text) and math.isfinite(float(text))):
+    if column.type == "number" and number_in(text) is None:
         return f"{quoted(text)} is not a finite number with a decimal point"
     if column.type in ("integer", "number"):
         return _number_fault(column, text)

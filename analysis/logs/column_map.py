@@ -27,6 +27,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_LOG, BadLogError
 from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
 from analysis.logs.measures import MEASURES
@@ -354,7 +355,7 @@ def _instruction(line: SeparatedLine, mapping: ColumnMap) -> str:
 
 def _rating(line: SeparatedLine, mapping: ColumnMap) -> _Row:
     cell = _decimal(line, str(mapping.columns.rating), mapping)
-    if mapping.rating is not None and (value := _number_in(cell)) is not None:
+    if mapping.rating is not None and (value := number_in(cell)) is not None:
         scale = mapping.rating
         if not scale.scale_min <= value <= scale.scale_max:
             rule = f"(rule: {scale.scale_min:g} to {scale.scale_max:g}, as the map says)"
@@ -380,24 +381,17 @@ def _seconds(line: SeparatedLine, mapping: ColumnMap) -> str:
     if mapping.columns.response_time is None or mapping.response_time is None:
         return tables.MISSING
     cell = _decimal(line, mapping.columns.response_time, mapping)
-    value = _number_in(cell)
+    value = number_in(cell)  # what is none stays as it is: the rules say what is wrong with it
     return repr(value / 1000.0) if value is not None and mapping.response_time.unit == "ms" else cell
 
 
 def _decimal(line: SeparatedLine, column: str, mapping: ColumnMap) -> str:
     """A cell's number with a decimal point. `BadLogError`: it has a comma, and the map does not say so."""
     cell = line.cells[column]
-    if "," in cell and mapping.text.decimal == "." and _number_in(cell.replace(",", ".")) is not None:
+    if "," in cell and mapping.text.decimal == "." and number_in(cell.replace(",", ".")) is not None:
         how = 'write decimal = "," under [text] in the map'
         raise BadLogError(f"{cell!r} has a decimal comma (rule: text.decimal, a point); {how}", line.number, column)
     return cell.replace(mapping.text.decimal, ".")
-
-
-def _number_in(cell: str) -> float | None:
-    try:
-        return float(cell)
-    except ValueError:
-        return None  # the rules say what is wrong with it
 
 
 def _number(rows: list[_Row], mapping: ColumnMap) -> None:

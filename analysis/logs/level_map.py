@@ -15,6 +15,7 @@ from typing import Annotated, Literal, Self
 import pandas as pd
 from pydantic import Field, model_validator
 
+from analysis.logs.cell_rules import number_in
 from analysis.logs.column_map import Skip
 from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
 from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
@@ -144,10 +145,7 @@ def _level(line: SeparatedLine, mapping: LevelMap) -> float:
     """The level; NaN of an empty cell, a trial without a stimulus."""
     column = mapping.columns.level
     cell = line.cells[column]
-    try:
-        level = float(cell.replace(mapping.text.decimal, ".")) if cell else math.nan
-    except ValueError:
-        level = math.inf
-    if math.isinf(level):
+    level = number_in(cell.replace(mapping.text.decimal, ".")) if cell else math.nan
+    if level is None:
         raise BadLogError(f"{cell!r} is no level (rule: a number, text.decimal as its mark)", line.number, column)
     return level
