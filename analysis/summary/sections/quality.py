@@ -85,8 +85,8 @@ def undefined_numbers(report: ReportData) -> Iterator[Section]:
 def _times_sentence(times: ResponseTimes) -> str:
     """How many response times there are, and which are none."""
     left_out = (
-        f"{times.left_out:,} answered trials have none: there is no time in the log, or the answer was entered or "
-        "corrected by the experimenter, whose hand tells nothing of the participant's time."
+        f"{times.left_out:,} answered trials have none: there is no time in the log, or it is 0, or the answer was "
+        "entered or corrected by the experimenter, whose hand tells nothing of the participant's time."
     )
     if not times.n:
         return f"There is no valid response time, and so no figure of them. {left_out}"
