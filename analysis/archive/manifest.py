@@ -87,7 +87,7 @@ def _entries(folder: Path, below: str = "") -> Iterator[tuple[str, str]]:
         with os.scandir(folder / below) as found:
             entries = sorted(found, key=lambda entry: entry.name)
     except OSError as error:
-        raise PlaceError(f"{folder / below}: cannot be read ({error.strerror})") from error
+        raise PlaceError(f"{shown_name(folder / below)}: cannot be read ({error.strerror})") from error
     for entry in entries:
         path = f"{below}{entry.name}"
         if entry.is_symlink():

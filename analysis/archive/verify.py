@@ -18,6 +18,7 @@ from pathlib import Path
 from analysis.archive import making, manifest
 from analysis.archive.contents import CONTENTS
 from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
+from analysis.logs.files import shown_line, shown_name
 from analysis.logs.reading import Track
 from analysis.report import placing
 from analysis.report.serial import as_json
@@ -38,7 +39,7 @@ _NAMED = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What was checked of an archive, what is wrong with it, and what there is to say otherwise.
+    """What was checked of an archive, what is wrong with it, and what there is to say otherwise, a line each.
 
     `manifest_sha256` vouches for all of it: whoever published it knows which archive this is. `rebuilt` are the tables
     and statistics that were made again and found to be the same; none if a hash is wrong already.
@@ -58,11 +59,12 @@ class Verified:
 
     def as_text(self) -> str:
         """The verdict in a line."""
+        shown = shown_name(self.archive)
         if self.whole:
             made = f"{self.rebuilt} tables and statistics made again from its journals are the same"
             vouches = f"sha256 of its manifest: {self.manifest_sha256}"
-            return f"{self.archive}: whole ({self.files} files), and {made}\n{vouches}"
-        return f"{self.archive}: {len(self.faults)} of its parts are not as they were archived"
+            return f"{shown}: whole ({self.files} files), and {made}\n{vouches}"
+        return f"{shown}: {len(self.faults)} of its parts are not as they were archived"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,14 +92,14 @@ def verify(folder: Path, track: Track = iter) -> Verified:
                 rebuilt = len(made)
             except RecoilError as error:
                 said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")
-                faults = [f"cannot be made again: {line}" for line in said.splitlines()]
+                faults = [f"cannot be made again: {line}" for line in said.split("\n")]
     return Verified(
         archive=str(folder),
         manifest_sha256=hashes.sha256,
         files=len(hashes.listed),
         rebuilt=rebuilt,
-        faults=tuple(faults),
-        remarks=tuple(remarks),
+        faults=tuple(map(shown_line, faults)),
+        remarks=tuple(map(shown_line, remarks)),
     )
 
 

@@ -287,12 +287,24 @@ def study_names(folders: Iterable[str]) -> dict[str, str]:
 
 
 def shown_name(path: str | PurePath) -> str:
-    r"""A path as text, whatever bytes it is made of: those that are no UTF-8 are escaped.
+    r"""A path on one line of text, whatever bytes it is made of: no UTF-8, control characters and breaks are escaped.
 
-    >>> shown_name("caf\udce9/results")
-    'caf\\xe9/results'
+    >>> shown_name("caf\udce9/results"), shown_name("a\nb")
+    ('caf\\xe9/results', 'a\\nb')
     """
-    return os.fsencode(path).decode("utf-8", "backslashreplace")
+    return shown_line(os.fsencode(path).decode("utf-8", "backslashreplace"))
+
+
+def shown_line(text: str) -> str:
+    r"""A text as one line: characters that would break it or steer a terminal are escapes.
+
+    >>> shown_line("a\r\nb\x1b[2J")
+    'a\\r\\nb\\x1b[2J'
+    """
+    return _NO_LINE.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+_NO_LINE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
 
 
 def _shared(ways: list[tuple[str, ...]]) -> int:
