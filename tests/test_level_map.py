@@ -92,8 +92,8 @@ def test_a_level_that_is_not_there_is_a_trial_without_a_stimulus(lab: Path) -> N
     assert read.table["success"].tolist() == [0.0, 1.0]
 
 
-@pytest.mark.parametrize("cell", ["5_04", "nan", "inf", "1e999", "٥"])
-def test_a_level_that_python_alone_reads_as_a_number_is_refused(lab: Path, cell: str) -> None:
+@pytest.mark.parametrize("cell", ["5_04", "nan", "inf", "1e999", "-1e51", "٥"])
+def test_a_level_that_is_no_number_or_too_large_to_square_is_refused(lab: Path, cell: str) -> None:
     (lab / "map.toml").write_text(MAP.replace('decimal = ","', 'decimal = ","\nmissing = [""]'))
     (lab / "lab.csv").write_text(f"VP;Reiz;Treffer;Hand\nVP_01;6,5;ja;links\nVP_01;{cell};ja;links\n")
     (problem,) = read_levels([lab / "lab.csv"], load(LevelMap, lab / "map.toml")).problems

@@ -141,11 +141,16 @@ def _success(line: SeparatedLine, column: str, known: Mapping[str, bool]) -> boo
     return said
 
 
+_LARGEST_LEVEL = 1e50
+"""Of larger ones the squares of differences are no numbers."""
+
+
 def _level(line: SeparatedLine, mapping: LevelMap) -> float:
     """The level; NaN of an empty cell, a trial without a stimulus."""
     column = mapping.columns.level
     cell = line.cells[column]
     level = number_in(cell.replace(mapping.text.decimal, ".")) if cell else math.nan
-    if level is None:
-        raise BadLogError(f"{cell!r} is no level (rule: a number, text.decimal as its mark)", line.number, column)
+    if level is None or abs(level) > _LARGEST_LEVEL:
+        rule = f"(rule: a number up to {_LARGEST_LEVEL:g}, text.decimal as its mark)"
+        raise BadLogError(f"{cell!r} is no level {rule}", line.number, column)
     return level
