@@ -113,8 +113,11 @@ def test_rules_and_what_they_left_out_stand_in_the_statistics_and_the_report(rec
     write_rows(trials_path(tmp_path / "study", "P02"), rows)
     rules = tmp_path / "rules.toml"
     rules.write_text((EXAMPLES / "rules.toml").read_text() + '\n[[excluded]]\ncode = "P04"\nreason = "fell ill"\n')
+    with rules.open("a") as file:
+        file.write('\n[[excluded]]\ncode = "P40"\nreason = "fell ill"\n')
     done = recoil("analyze", tmp_path / "study", "--out", tmp_path / "out", "--rules", rules)
     assert done.returncode == 1, done.stderr
+    assert "recoil: the rules exclude P40, who has no log here\n" in done.stderr  # it may be a slip of the pen
     found = _statistics(tmp_path / "out")
     assert found["rules"]["dropped"]["direction"] == {"P02": {"drop_flags": 1}}
     assert found["rules"]["trials"]["direction"] == {"recorded": 240, "kept": 239}

@@ -114,7 +114,9 @@ def analyze(
             write_report(part, report, tell)
         for path, content in _tables(parts).items():
             placing.write_file(part, path, content)
-    return report.statistics, (*edited, *_said(logs, report.statistics)), tuple(map(str, logs.notes))
+    without_effect = [warning for one in parts if one.effect is not None for warning in one.effect.warnings]
+    notes = (*map(str, logs.notes), *without_effect)
+    return report.statistics, (*edited, *_said(logs, report.statistics)), notes
 
 
 def result_files(request: Request, track: Track = iter) -> dict[str, bytes]:
