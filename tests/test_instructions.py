@@ -23,8 +23,9 @@ from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.run import run
 from experiments.run_request import RunRequest
+from experiments.screens.console.instructions import instruction
 from experiments.screens.console.progress import coming
-from experiments.screens.console.view import About, Seen, instruction
+from experiments.screens.console.view import About, Seen
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import read_out_text
