@@ -325,9 +325,7 @@ def test_an_unfinished_run_is_neither_gone_on_with_nor_written_over_unasked(
 ) -> None:
     journal = broken_off(unbroken[name], tmp_path, 6)
     before = journal.read_bytes()
-    with pytest.raises(
-        PlaceError, match=r"unfinished run .* after record 5: .*--resume goes on .*--fresh --reason T"
-    ):
+    with pytest.raises(PlaceError, match=r"unfinished run .* after record 5: .*--resume goes on .*--fresh --reason T"):
         run(request(name, tmp_path, "ask"), synthetic_screen, VirtualClock())
     assert journal.read_bytes() == before
 
