@@ -125,6 +125,11 @@ class Trial:
     catch: bool = False
     track: int = 0
 
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Which one of its plan it is."""
+        return self.session, self.set, self.trial
+
     def with_chosen(self, chosen: Condition) -> Trial:
         """The trial with the levels that a procedure chose for it, where it has none yet: what was felt.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -95,16 +95,27 @@ def counting(history: History) -> GrowingHistory:
     Of one that was spoiled nothing counts from then on, also while it waits for its next presentation: no answer is
     ever taken for one to a stimulus that it was not given to.
     """
-    found, gone = GrowingHistory(), set[Trial]()
+    found, gone = GrowingHistory(), set[tuple[int, int, int]]()
     for step, word in reversed(history):
         trial = _trial(step, word)
-        if trial not in gone or not isinstance(word, _OF_A_PRESENTATION):
+        if not (isinstance(word, _OF_A_PRESENTATION) and trial is not None and trial.place in gone):
             found.append((step, word))
         if isinstance(word, steps.Repeated):
-            gone.add(word.trial)
+            gone.add(word.trial.place)
         elif trial is not None and is_attempt(step, word):
-            gone.add(trial)
+            gone.add(trial.place)
     return found[::-1]
+
+
+def about_trials(history: History, trials: Iterable[Trial]) -> GrowingHistory:
+    """What is told of some trials, that they were spoiled included: little, where much is looked at again and again."""
+    places = {trial.place for trial in trials}
+    return [
+        (step, word)
+        for step, word in history
+        if (isinstance(word, steps.Repeated) and word.trial.place in places)
+        or ((trial := _trial(step, word)) is not None and trial.place in places)
+    ]
 
 
 _OF_A_PRESENTATION = (steps.Fired, steps.Presented, steps.Answered, EntryCorrected)
@@ -158,7 +169,7 @@ def asked_before(history: History, about: EntryCorrected) -> Asking | None:
 
 def entered_value(history: History, asked: Asking) -> AnswerValue:
     """What an entry says, as it counts: the last that was entered. `None`: no answer."""
-    said = [_value(step, word, asked) for step, word in counting(history)]
+    said = [_value(step, word, asked) for step, word in counting(about_trials(history, [asked.trial]))]
     return next((one[0] for one in reversed(said) if one), None)
 
 

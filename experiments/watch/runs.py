@@ -12,7 +12,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
-from experiments.design.plan import Trial
 from experiments.rebuild import JOURNAL_NAME, began_with, misnamed
 from experiments.record import replay, storage
 from experiments.record.journal import Contents, Head, JournalError, Record, read_as
@@ -227,8 +226,8 @@ class RunSoFar:
     @property
     def done(self) -> int:
         """How many of the planned trials were judged, or felt until next."""
-        planned = {_key(trial) for trial in self.plan.trials}
-        return len(planned & {_key(trial) for trial in done(self._told, self.design)})
+        planned = {trial.place for trial in self.plan.trials}
+        return len(planned & {trial.place for trial in done(self._told, self.design)})
 
     @property
     def where(self) -> str:
@@ -246,10 +245,6 @@ class RunSoFar:
             now_s=self.last.monotonic_s + max(0.0, age_s(self.last.utc, utc_now)),
         )
         return remaining_s(ahead, self._timing)
-
-
-def _key(trial: Trial) -> tuple[int, int, int]:
-    return trial.session, trial.set, trial.trial
 
 
 def _corrects(record: Record) -> bool:

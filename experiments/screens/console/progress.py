@@ -15,7 +15,7 @@ from experiments.screens.console.view import About, Seen
 from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
-from experiments.session.history import History, answered, done, entries, felt, of_one_set
+from experiments.session.history import History, about_trials, answered, done, entries, felt, of_one_set
 from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
 from experiments.session.states import State
 from experiments.session.steps import Asking, Outcome, Step
@@ -133,7 +133,8 @@ def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
 
 def answer_lines(seen: Seen) -> list[str]:
     """What was entered in the set at hand, as it counts now."""
-    return [texts.entry_text(seen.about.plan, seen.told, entry) for entry in entries(seen.told, seen.here)]
+    told = about_trials(seen.told, _set_of(seen.about.plan, seen.here))
+    return [texts.entry_text(seen.about.plan, told, entry) for entry in entries(told, seen.here)]
 
 
 def marks(seen: Seen) -> list[str]:
