@@ -62,6 +62,18 @@ def few_of_each(messages: Iterable[str]) -> Iterator[str]:
             yield f"... and {count - _LIKE} more like it{f' ({said.strip()})' if said else ''}"
 
 
+def escaped(text: str, kept: str = "") -> str:
+    r"""A text whose characters that break a line or steer a terminal are escapes; those that are `kept` stay.
+
+    >>> escaped("a\r\nb\x1b[2J"), escaped("a\tb\n", kept="\t\n")
+    ('a\\r\\nb\\x1b[2J', 'a\tb\n')
+    """
+    return _STEERING.sub(lambda found: found[0] if found[0] in kept else ascii(found[0])[1:-1], text)
+
+
+_STEERING = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+
+
 def first_few(names: Sequence[object], most: int) -> str:
     """The first names of a list, and how many more there are.
 

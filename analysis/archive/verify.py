@@ -18,13 +18,13 @@ from pathlib import Path
 from analysis.archive import making, manifest
 from analysis.archive.contents import CONTENTS
 from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
-from analysis.logs.files import shown_line, shown_name
+from analysis.logs.files import shown_name
 from analysis.logs.reading import Track
 from analysis.report import placing
 from analysis.report.serial import as_json
 from analysis.summary.analyze import result_files
 from analysis.summary.results import STATISTICS_FILE
-from device.words import RecoilError
+from device.words import RecoilError, escaped
 from experiments.rebuild import rebuild, shots_path, shots_table
 from experiments.record import journal, storage
 from experiments.record.lines import strict_json
@@ -98,8 +98,8 @@ def verify(folder: Path, track: Track = iter) -> Verified:
         manifest_sha256=hashes.sha256,
         files=len(hashes.listed),
         rebuilt=rebuilt,
-        faults=tuple(map(shown_line, faults)),
-        remarks=tuple(map(shown_line, remarks)),
+        faults=tuple(map(escaped, faults)),
+        remarks=tuple(map(escaped, remarks)),
     )
 
 

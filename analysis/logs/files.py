@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from device.words import RecoilError
+from device.words import RecoilError, escaped
 from experiments.record import storage, tables
 
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in tables.FILE_SUFFIX.values())
@@ -292,19 +292,7 @@ def shown_name(path: str | PurePath) -> str:
     >>> shown_name("caf\udce9/results"), shown_name("a\nb")
     ('caf\\xe9/results', 'a\\nb')
     """
-    return shown_line(os.fsencode(path).decode("utf-8", "backslashreplace"))
-
-
-def shown_line(text: str) -> str:
-    r"""A text as one line: characters that would break it or steer a terminal are escapes.
-
-    >>> shown_line("a\r\nb\x1b[2J")
-    'a\\r\\nb\\x1b[2J'
-    """
-    return _NO_LINE.sub(lambda found: ascii(found[0])[1:-1], text)
-
-
-_NO_LINE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+    return escaped(os.fsencode(path).decode("utf-8", "backslashreplace"))
 
 
 def _shared(ways: list[tuple[str, ...]]) -> int:

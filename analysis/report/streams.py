@@ -5,10 +5,11 @@ from __future__ import annotations
 import codecs
 import io
 import os
-import re
 import sys
 import unicodedata
 from typing import TextIO
+
+from device.words import escaped
 
 _PLAIN = {
     **dict.fromkeys("−‐‑‒–—", "-"),
@@ -94,10 +95,7 @@ def visible(text: str) -> str:
     >>> visible("a\x1b[2J\n")
     'a\\x1b[2J\n'
     """
-    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
-
-
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+    return escaped(text, kept="\t\n")
 
 
 def takes_all(stream: object) -> bool:
