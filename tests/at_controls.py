@@ -420,6 +420,8 @@ class PaperWindow:
         return self.fields[field]
 
     def take_typed(self) -> str:
+        if self.controls is None or self.controls.drawn.correcting is not None:
+            return ""  # what was typed before the correction was opened went with it here
         typed = self.fields["number"]
         self.fields["number"] = self.fields["words"] = ""
         return typed

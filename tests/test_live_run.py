@@ -520,6 +520,35 @@ def test_flags_and_notes_go_to_the_trial_that_they_were_opened_for(tmp_path: Pat
     ]
 
 
+@pytest.mark.parametrize("how", ["emergency", "stop", "leave", "enter"])
+def test_a_correction_that_is_half_typed_is_kept_as_a_note_unless_it_is_left_or_entered(
+    how: str, tmp_path: Path
+) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        rate_and_describe(sitting)
+        assert opened(sitting, 2)[-1][1] == "rating"
+        sitting.ready()
+        sitting.window.paint()
+        sitting.window.type_text("2.5")
+        first = sitting.position.correcting
+        assert first is not None
+        if how == "stop":
+            sitting.window.press("Q", ctrl=True)
+            sitting.window.fields["line"] = "enough"
+            sitting.window.press("Enter")
+        elif how == "emergency":
+            sitting.window.press("F12")
+        else:
+            sitting.window.press("Esc" if how == "leave" else "Enter")
+        sitting.settle()
+        sitting.window.paint()
+        contents = of_journal(sitting)
+    kept_as = [Noted(trial=first.trial, text="correction: 2.5")] if how in ("emergency", "stop") else []
+    assert remarks(contents, Noted) == kept_as
+    assert [one.value for one in remarks(contents, EntryCorrected)] == ([2.5] if how == "enter" else [])
+
+
 def test_a_repeat_that_was_asked_for_one_trial_is_not_taken_for_the_next(tmp_path: Path) -> None:
     with sat(PREFERENCE, tmp_path) as sitting:
         sitting.to(S.RATING)

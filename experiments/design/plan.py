@@ -202,9 +202,13 @@ class Plan:
         """The methods in the order in which they are met, but for those that are compared within a trial."""
         return tuple(dict.fromkeys(trial.method for trial in self.trials if trial.method))
 
+    def set_of(self, trial: Trial) -> list[Trial]:
+        """The trials of the set that a trial is of."""
+        return [one for one in self.trials if (one.session, one.set) == (trial.session, trial.set)]
+
     def opens_set(self, trial: Trial) -> bool:
         """Whether a trial is the first of its set."""
-        return trial == next(t for t in self.trials if (t.session, t.set) == (trial.session, trial.set))
+        return trial == self.set_of(trial)[0]
 
     def record(self) -> dict[str, object]:
         """The plan as plain JSON values."""

@@ -32,7 +32,7 @@ def ordinal(plan: Plan, trial: Trial, messages: ParticipantMessages = ENGLISH_ME
 
 def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
     """The number of a trial in its set, from 1, and how many the set has."""
-    block = [other for other in plan.trials if of_one_set(other, trial)]
+    block = plan.set_of(trial)
     return block.index(trial) + 1, len(block)
 
 

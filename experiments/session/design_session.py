@@ -83,7 +83,7 @@ def _left_over(presenter: Presenter, script: _Script, passed: Sequence[Trial]) -
 def _block_over(presenter: Presenter, script: _Script, last: Trial, passed: Sequence[Trial]) -> Session:
     """The trials that are left, and what is asked about each of a set, in order of presentation, once all were felt."""
     yield from _left_over(presenter, script, passed)
-    for trial in script.set_of(last):
+    for trial in script.plan.set_of(last):
         for step in script.questions(trial, when="block"):
             yield from presenter.until_done(step)
 
@@ -112,9 +112,6 @@ class _Script:
         self._tracks = adaptive_tracks(design, plan, told)
         self._shown = design.adaptive is not None and design.adaptive.show_level
         self._of_track = _by_track(plan)
-
-    def set_of(self, trial: Trial) -> list[Trial]:
-        return [one for one in self.plan.trials if of_one_set(one, trial)]
 
     def due(self, trial: Trial) -> Trial | None:
         """The trial that a place of the plan is for: of a track the next one in the set; `None` if that is over."""
@@ -226,7 +223,9 @@ class _Script:
             case "text":
                 return Describe(trial=trial, question=name, text=question.text, later=later)
             case "ranking":
-                return replace(_rate(name, question, trial, (1.0, float(len(self.set_of(trial))), 1.0)), distinct=True)
+                return replace(
+                    _rate(name, question, trial, (1.0, float(len(self.plan.set_of(trial))), 1.0)), distinct=True
+                )
             case _:
                 return _rate(name, question, trial, question.scale)
 

@@ -281,7 +281,12 @@ class Controls:
         return bool(verdict.taken) and not correcting
 
     def _keep_typed(self) -> None:
-        """The step goes that something was typed for: what was not entered is kept as a note."""
+        """What was typed for goes, a question or a correction: what was not entered is kept as a note."""
+        entry, field = self.drawn.correcting, keys.field_at(self.drawn)
+        if entry is not None and field is not None:
+            typed = typed_line(self._view.typed(field))
+            if typed not in ("", self.entered_so_far()):
+                self._live.offer(events.Note(text=f"correction: {typed}", trial=entry.trial))
         step, typed = self.drawn.step, typed_line(self._view.take_typed())
         if typed and isinstance(step, Asking):
             self._live.offer(events.Note(text=f"{what(step)}: {typed}", trial=step.trial))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 from device import GunStatus
-from experiments.design.plan import Plan, Trial
+from experiments.design.plan import Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
 from experiments.screens.console.instructions import gun_trouble
@@ -41,7 +41,7 @@ def trials_done(seen: Seen) -> list[TrialCount]:
         return [_count("felt", trials, felt(seen.told)), _count("rated", trials, rated)]
     finished = done(seen.told, design)
     session = [trial for trial in trials if trial.session == here.session]
-    parts = {"set": [trial for trial in session if of_one_set(trial, here)], "session": session, "experiment": trials}
+    parts = {"set": seen.about.plan.set_of(here), "session": session, "experiment": trials}
     return [_count(what, trials, finished) for what, trials in parts.items()]
 
 
@@ -67,7 +67,7 @@ def _to_come(seen: Seen) -> Iterator[str]:
     resting, later = isinstance(step, steps.Rest), isinstance(step, Asking) and step.later
     if isinstance(step, Asking) and step.later:
         yield from _still_asked(about, step)
-        here = _set_of(about.plan, here)[-1]
+        here = about.plan.set_of(here)[-1]
     trials = about.plan.trials
     after = [trial for trial in trials[trials.index(here) + 1 :] if trial.track not in seen.over]
     for before, trial in pairwise([here, *after]):
@@ -82,14 +82,10 @@ def _to_come(seen: Seen) -> Iterator[str]:
     yield phrase("the end")
 
 
-def _set_of(plan: Plan, trial: Trial) -> list[Trial]:
-    return [one for one in plan.trials if of_one_set(one, trial)]
-
-
 def _still_asked(about: About, step: Asking) -> Iterator[str]:
     """What is still asked about the trials of a set that were felt."""
     design = about.setup.config
-    asked = [(trial, name) for trial in _set_of(about.plan, step.trial) for name in design.asked_later]
+    asked = [(trial, name) for trial in about.plan.set_of(step.trial) for name in design.asked_later]
     for trial, name in asked[asked.index((step.trial, step.question)) + 1 :]:
         place, kind = texts.ordinal(about.plan, trial), design.questions[name].kind
         if kind == "text":
@@ -133,7 +129,7 @@ def _break_between(about: About, before: Trial, trial: Trial) -> list[str]:
 
 def answer_lines(seen: Seen) -> list[str]:
     """What was entered in the set at hand, as it counts now."""
-    told = about_trials(seen.told, _set_of(seen.about.plan, seen.here))
+    told = about_trials(seen.told, seen.about.plan.set_of(seen.here))
     return [texts.entry_text(seen.about.plan, told, entry) for entry in entries(told, seen.here)]
 
 
@@ -141,17 +137,13 @@ def marks(seen: Seen) -> list[str]:
     """Flags, notes, corrections and repeats of the set at hand, in order."""
     here = seen.here
     found = [
-        _mark(seen.told, word) for step, word in seen.told if (trial := _about(step, word)) and _same_set(trial, here)
+        _mark(seen.told, word) for step, word in seen.told if (trial := _about(step, word)) and of_one_set(trial, here)
     ]
     return list(filter(None, found)) or [phrase("Nothing was flagged, noted, corrected or repeated in this set.")]
 
 
 def _about(step: Step | None, word: Outcome | Remark) -> Trial | None:
     return word.trial if isinstance(word, steps.Repeated) or (step is None and hasattr(word, "trial")) else None
-
-
-def _same_set(one: Trial, other: Trial) -> bool:
-    return (one.session, one.set) == (other.session, other.set)
 
 
 def _mark(told: History, word: Outcome | Remark) -> str:
