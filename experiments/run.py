@@ -41,7 +41,7 @@ from experiments.record.replay import RunPosition
 from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out, gun_name
 from experiments.session.design_session import design_session
-from experiments.session.history import GrowingHistory, answered
+from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Noted
 from experiments.session.steps import Answered, Session, step_record
 from experiments.study import balance, folders, preregistration, register
@@ -235,9 +235,9 @@ def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest)
     """`PlaceError`: what a person answered is set aside, and nobody says why."""
     if contents is None or request.practice or request.anew_reason or contents.head.participant != "person":
         return
-    if count := len(answered(replay.history(contents), ())):
+    if count := sum(isinstance(word, Answered) for _, word in replay.history(contents)):
         raise PlaceError(
-            f"{where.journal}: trials with answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
+            f"{where.journal}: has answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
         )
 
 

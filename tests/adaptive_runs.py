@@ -266,8 +266,9 @@ def _said_of_the_last(history: History, trial: Trial, question: str) -> tuple[An
 def _begins_anew(step: Step | None, word: Outcome | Remark, trial: Trial) -> bool:
     if isinstance(word, Repeated):
         return word.trial == trial
-    unfelt = isinstance(word, Failed | Interrupted) and not word.presented
-    return isinstance(step, FireShot) and step.trial == trial and step.interval == 0 and not unfelt
+    if isinstance(word, Failed | Interrupted):
+        return _about(step, word) == trial
+    return isinstance(step, FireShot) and step.trial == trial and step.interval == 0
 
 
 def steps_with_history(contents: Contents) -> Iterator[tuple[FireShot, History]]:

@@ -21,6 +21,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import damper
 from experiments.load import load_setup
+from experiments.record.design_table import design_rows
 from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.instructions import instruction
 from experiments.screens.console.progress import trials_done
@@ -29,7 +30,7 @@ from experiments.screens.texts import ends_text, typed_rating
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Asking, Prepare, Present, Presented, Repeated, Rest
+from experiments.session.steps import Answered, Asking, Interrupted, Prepare, Present, Presented, Repeated, Rest
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 from tests.designs import direction_with
@@ -456,6 +457,7 @@ def test_no_time_has_gone_by_before_the_run_begins() -> None:
         *((0.1, "7,3", 7.3), (0.5, "7.5", 7.5), (1.0, "10", 10.0), (0.0, "7.123", 7.123), (0.1, " 0 ", 0.0)),
         (1.0, "2.5", "It goes in steps of 1: type 2 or 3."),
         (0.5, "7.3", "It goes in steps of 0.5: type 7 or 7.5."),
+        (0.5, "3.50000001", "It goes in steps of 0.5: type 3.5 or 4."),
         (1.0, "9.51", "It goes in steps of 1: type 9 or 10."),
         *((0.1, typed, "Not a rating: type a number from 0 to 10.") for typed in ("11", "-1", "nan", "1_0", "", "1e")),
     ],
@@ -510,6 +512,12 @@ def test_a_trial_is_done_when_all_that_is_asked_at_once_is_answered(several: Set
     here = seen(several, Position(step=prepare(first)), *spoiled)
     assert counted(here)[0] == ("set", 0, 2)
     assert progress.answer_lines(here) == []
+    broken = (said, (strength, Interrupted(presented=True)))  # killed, and resumed: it is presented again
+    here = seen(several, Position(step=prepare(first)), *broken)
+    assert (counted(here)[0], progress.answer_lines(here)) == (("set", 0, 2), [])
+    assert [
+        row["response"] for row in design_rows(plan_of(several), broken, several.config)[:1] if "response" in row
+    ] == []
 
 
 def test_what_comes_next_in_a_set_with_questions_after_it_ends_with_the_set(several: Setup[DesignConfig]) -> None:

@@ -128,7 +128,7 @@ def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path,
         assert "has an unfinished run of direction" in screen.seen
     with AtTerminal(run(quick_configs, "direction", "--fresh"), tmp_path) as screen:
         assert screen.end() == 2
-        assert "trials with answers: 2; --fresh sets them aside, so say why with --reason TEXT" in screen.seen
+        assert "has answers: 2; --fresh sets them aside, so say why with --reason TEXT" in screen.seen
     with AtTerminal(run(quick_configs, "direction", "--fresh", "--reason", "wrong damper"), tmp_path) as screen:
         screen.wait_for("Trial 1 of")
         screen.type("stop")

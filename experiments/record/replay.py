@@ -130,9 +130,9 @@ def go_on(
         return position
     if not announced:
         append("step", body=steps.step_record(step))
-    if not (announced or _after_a_stimulus(step) or isinstance(step, steps.FireShot | steps.Present)):
+    if not (announced or steps.is_begun(step) or isinstance(step, steps.FireShot | steps.Present)):
         return position
-    felt = _after_a_stimulus(step) or (announced and isinstance(step, steps.FireShot | steps.Present))
+    felt = steps.is_begun(step) or (announced and isinstance(step, steps.FireShot | steps.Present))
     outcome = steps.Interrupted(presented=felt)
     append("outcome", body=steps.step_record(outcome))
     position.history.append((step, outcome))
@@ -140,12 +140,6 @@ def go_on(
     if again is not None:
         append("step", body=steps.step_record(again))
     return replace(position, step=again)
-
-
-def _after_a_stimulus(step: steps.Step) -> bool:
-    """Whether the trial of a step was felt, or a part of it: where the run breaks off there, it is presented again."""
-    begun = isinstance(step, steps.Prepare | steps.FireShot) and step.interval > 0
-    return begun or steps.asks_at_once(step)
 
 
 def _last_step_is_open(contents: Contents) -> bool:

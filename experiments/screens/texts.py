@@ -278,7 +278,7 @@ def typed_rating(text: str, scale: Scale) -> float | str:
         number = math.nan
     if not scale.minimum <= number <= scale.maximum:
         return phrase("Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum)
-    if math.isclose(number, nearest := on_scale(number, scale), abs_tol=_TINY * scale.grain):
+    if number == (nearest := on_scale(number, scale)):
         return nearest
     other = on_scale(nearest + math.copysign(scale.grain, number - nearest), scale)
     low, high = sorted((nearest, other))

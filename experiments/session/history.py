@@ -92,8 +92,8 @@ def by_trial(trials: Sequence[Trial], history: History) -> dict[Trial, TrialHist
 def counting(history: History) -> GrowingHistory:
     """The history without what counts no more: what was felt and said of a trial before it was presented again.
 
-    Of one that was spoiled nothing counts from then on, also while it waits for its next presentation: no answer is
-    ever taken for one to a stimulus that it was not given to.
+    Of one that was spoiled, or broke off, nothing counts from then on, also while it waits for its next presentation:
+    no answer is ever taken for one to a stimulus that it was not given to.
     """
     found, gone = GrowingHistory(), set[tuple[int, int, int]]()
     for step, word in reversed(history):
@@ -102,7 +102,7 @@ def counting(history: History) -> GrowingHistory:
             found.append((step, word))
         if isinstance(word, steps.Repeated):
             gone.add(word.trial.place)
-        elif trial is not None and is_attempt(step, word):
+        elif trial is not None and (steps.breaks_off(step, word) or is_attempt(step, word)):
             gone.add(trial.place)
     return found[::-1]
 

@@ -319,6 +319,16 @@ def asks_at_once(step: Step | None) -> bool:
     return isinstance(step, Asking) and not step.later
 
 
+def is_begun(step: Step | None) -> bool:
+    """Whether a trial was felt, or a part of it, when this step is due: if that breaks off, it is presented again."""
+    return (isinstance(step, Prepare | FireShot) and step.interval > 0) or asks_at_once(step)
+
+
+def breaks_off(step: Step | None, word: object) -> bool:
+    """Whether a step ends so that its trial is presented again; one that is only told or asked later goes on."""
+    return isinstance(word, Failed | Interrupted) and (isinstance(step, FireShot | Present) or is_begun(step))
+
+
 def trial_of(step: Step | None) -> Trial | None:
     """The trial that a step is about, if it is about one."""
     return step.trial if isinstance(step, TrialStep) else None

@@ -87,10 +87,10 @@ class Tracks:
                 self._forget(word.trial)
             case steps.Fired() | steps.Presented() if isinstance(step, steps.FireShot | steps.Present):
                 self._felt[step.trial] = step.chosen
-            case steps.Failed() | steps.Interrupted() if isinstance(
-                step, steps.FireShot | steps.Present | steps.Asking
+            case steps.Failed() | steps.Interrupted() if steps.breaks_off(step, word) and (
+                trial := steps.trial_of(step)
             ):
-                self._forget(step.trial)
+                self._forget(trial)
             case steps.Answered() if isinstance(step, steps.Ask) and step.question == self._question:
                 self._count(step.trial, word.value)
 
