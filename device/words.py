@@ -84,6 +84,15 @@ def first_few(names: Sequence[object], most: int) -> str:
     return ", ".join(map(str, names[:most])) + more
 
 
+def how_many(number: int, noun: str) -> str:
+    """So many of them; a noun of several words has its plural at its end.
+
+    >>> how_many(1, "log file"), how_many(1_200, "log file")
+    ('1 log file', '1,200 log files')
+    """
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
 class RecoilError(Exception):
     """Anything that goes wrong and has a message for people: the root of all errors of this product.
 

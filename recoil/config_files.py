@@ -228,7 +228,8 @@ def new_study(folder: Path, design: str = "", *, paper: bool = False) -> list[Pa
     paper's numbers. `ConfigError`: there is no such shipped design.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise PlaceError(f"{folder}: exists and is not empty; name a new folder")
+        there = "has something in it" if folder.is_dir() else "is no folder"
+        raise PlaceError(f"{folder}: {there}; name a new folder, or an empty one")
     page, results = folder / "README.md", folder / "results"
     if design:
         made = _study_of(folder, design, paper=paper)

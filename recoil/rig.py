@@ -95,11 +95,18 @@ def troubles_of(words: Sequence[str]) -> Troubles:
         try:
             if name not in known:
                 raise ValueError(f"unknown; known are {', '.join(known)}")
-            found[name] = float(value)
+            found[name] = _number(name, value)
             Troubles(**{name: found[name]})
         except ValueError as error:
             raise PlaceError(f"--trouble {word}: {error}") from error
     return Troubles(**found)
+
+
+def _number(name: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise ValueError(f"{name} is {value!r}; it must be a number") from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -74,8 +74,19 @@ def run_session(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
         with _markers(request.results, _say) if request.markers else nullcontext():
             return _SCREENS[request.screen](request).place
     except RunStopped as stop:
-        _say(f"stopped: {stop}. Go on with --resume.")
+        _say(f"stopped: {stop}. {_how_to_go_on(request)}")
         raise KeyboardInterrupt from stop
+    except KeyboardInterrupt:
+        _say(_how_to_go_on(request))
+        raise
+
+
+def _how_to_go_on(request: RunRequest) -> str:
+    """What to do about a run that was stopped."""
+    if request.practice:
+        return "A practice is begun anew each time: --practice."
+    begun = place(request.results, request.participant_id, request.setup.config.experiment).journal.exists()
+    return "Go on with --resume." if begun else "Nothing of the run had begun."
 
 
 def _markers(results: Path, say: Callable[[str], None]) -> AbstractContextManager[None]:

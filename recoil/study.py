@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from analysis.report.section import Section, Table
 from analysis.report.terminal import with_tables
+from device.words import how_many
 from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, open_study, overview
@@ -142,7 +143,7 @@ def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
 
 
 def _state(run: RunProgress) -> str:
-    counts = f", {run.answered} of {run.planned} trials"
+    counts = f", {run.answered} of {how_many(run.planned, 'trial')}"
     if run.state != "synthetic":  # whose clock is that of a simulation, often ahead of the world's
         counts += f", last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
@@ -154,9 +155,9 @@ def _count_lines(found: StudyStatus) -> Iterator[str]:
     people = found.overview.participants
     done = sum(all(run.state == "done" for run in one.runs) for one in taking_part(people))
     excluded = sum(one.excluded is not None for one in people)
-    yield f"{done} of {found.study.config.participants} participants done, {excluded} excluded"
+    yield f"{done} of {how_many(found.study.config.participants, 'participant')} done, {excluded} excluded"
     if synthetic := [run for one in people for run in one.runs if run.state == "synthetic"]:
-        runs = f"{len(synthetic)} run{'s' if len(synthetic) > 1 else ''} of synthetic participants"
+        runs = f"{how_many(len(synthetic), 'run')} of synthetic participants"
         yield f"{runs}: not counted, and set aside when a person comes to that code and experiment"
 
 

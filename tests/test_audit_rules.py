@@ -212,6 +212,7 @@ def test_totals_take_the_rounding_of_their_parts() -> None:
         (lambda: p_against_statistic("t", "2", [], ".1"), "degrees of freedom"),
         (lambda: p_against_statistic("t", "2", ["< 28"], ".1"), "'< 28' is a bound"),
         (lambda: p_against_statistic("t", "2", ["28%"], ".1"), "'28%' is a percentage"),
+        (lambda: p_against_statistic("F", "2", ["1", "28"], ".1", sides="one-sided"), "not F: leave it out"),
         (lambda: total("3", []), "at least one term"),
         (lambda: total("3", [Term(times=[1], over=[0])]), "may be 0"),
     ],

@@ -242,12 +242,12 @@ def test_a_time_of_exactly_0_is_told_as_a_reason_for_having_none(tmp_path: Path,
     assert report.statistics.direction is not None
     assert report.statistics.direction.response_times.left_out == 2
     (section,) = quality_section(report)
-    assert "2 answered trials have none: there is no time in the log, or it is 0, or the" in section.paragraphs[0]
+    assert "None in 2 answered trials: there is no time in the log, or it is 0, or the" in section.paragraphs[0]
 
 
 def test_times_that_are_not_there_are_not_laid_on_the_experimenter(careless: ReportData) -> None:
     (section,) = quality_section(careless)
-    assert "60 answered trials have none: there is no time in the log, or it is 0, or " in section.paragraphs[0]
+    assert "None in 60 answered trials: there is no time in the log, or it is 0, or " in section.paragraphs[0]
     assert careless.statistics.direction is not None
     found = careless.statistics.direction.speed_accuracy
     assert found is not None

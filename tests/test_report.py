@@ -240,7 +240,7 @@ def test_times_by_the_experimenters_hand_are_no_response_times(tmp_path: Path) -
         write_rows(trials_path(tmp_path / "study", code), rows)
     write_report(tmp_path / "out", ReportData(title="Hand", statistics=summarize(read_logs([tmp_path / "study"]))))
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "There is no valid response time, and so no figure of them. 120 answered trials have none" in text
+    assert "There is no valid response time, and so no figure of them. None in 120 answered trials" in text
     assert "figure-response-times" not in text
     assert not list((tmp_path / "out" / "figures").glob("figure-response-times.*"))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,17 @@ def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Pa
         screen.wait_for("for no answer:", 7)
         screen.type("stop")
         assert screen.end() == 130
+
+
+@pytest.mark.parametrize(("words", "told"), [((), "Go on with --resume."), (("--practice",), "begun anew each time")])
+def test_an_interrupted_run_says_how_to_go_on(
+    words: tuple[str, ...], told: str, quick_configs: Path, tmp_path: Path
+) -> None:
+    with AtTerminal(run(quick_configs, "direction", *words), tmp_path) as screen:
+        screen.wait_for("rial 1 of ")
+        screen.process.send_signal(signal.SIGINT)
+        assert screen.end() == 130
+        assert told in screen.seen
 
 
 def test_a_stopped_run_keeps_its_table_and_needs_a_decision(quick_configs: Path, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ import pandas as pd
 from analysis.logs.cell_rules import as_moment
 from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
+from device.words import how_many
 from experiments.record import tables
 from experiments.record.design_columns import HANDS, columns
 from experiments.record.shots_table import SHOTS
@@ -185,9 +186,10 @@ def long_name(name: str) -> str:
 
 def readme(people: int, synthetic: int, *, free_text: bool) -> str:
     """The page of a data set: who is in it, how to read it, what is left out, what to add."""
-    who = f"{people} participant{'' if people == 1 else 's'}"
     simulated = f", {synthetic} of them synthetic: simulations, not people" if synthetic else ""
-    return _README.format(people=who, synthetic=simulated, text=_LEFT_IN if free_text else _LEFT_OUT)
+    return _README.format(
+        people=how_many(people, "participant"), synthetic=simulated, text=_LEFT_IN if free_text else _LEFT_OUT
+    )
 
 
 BIDS_VERSION = "1.11.1"

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from analysis.archive.contents import CONTENTS, MEANINGS, Entry
 from analysis.archive.manifest import MANIFEST_FILE
 from analysis.report.section import Section, Table
+from device.words import how_many
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
@@ -96,7 +97,7 @@ def archive_page(title: str, version: str, entries: Sequence[Entry], *, free_tex
 def _counts(entries: Sequence[Entry]) -> Iterator[str]:
     """How many runs are in which state, as Markdown."""
     people = {one.participant_id for one in entries if one.archived}
-    yield f"{len(people)} participant{'' if len(people) == 1 else 's'}.\n"
+    yield f"{how_many(len(people), 'participant')}.\n"
     yield f"| {' | '.join(_HEADER)} |"
     yield "| --- | --- | --- | --- |"
     yield from (f"| {' | '.join(row)} |" for row in _states(entries))
@@ -127,9 +128,9 @@ def methods(designs: Iterable[ArchivedDesign]) -> bytes:
 
 
 def _method(one: ArchivedDesign) -> Iterator[str]:
-    count = len(one.participants)
+    people = how_many(len(one.participants), "participant")
     yield f"# {one.design.title}\n"
-    yield f"Experiment `{one.design.design}`, {count} participant{'' if count == 1 else 's'}; gun: {one.gun.title}.\n"
+    yield f"Experiment `{one.design.design}`, {people}; gun: {one.gun.title}.\n"
     for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun)):
         yield f"{paragraph}\n"
     yield from _translations(one)

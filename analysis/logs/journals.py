@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
-from device.words import first_few
+from device.words import first_few, how_many
 from experiments.rebuild import JOURNAL_NAME, began_with, misnamed, table
 from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError
@@ -46,7 +46,7 @@ class BegunRun:
     @property
     def far(self) -> str:
         """How far it has come, in words."""
-        return f"{self.answered} of {self.planned} trials" if self.planned else "nothing was acknowledged"
+        return f"{self.answered} of {how_many(self.planned, 'trial')}" if self.planned else "nothing was acknowledged"
 
     @property
     def remedy(self) -> str:

@@ -11,6 +11,7 @@ from analysis.predict.check_design import AS_FROZEN, DesignCheck, check_design, 
 from analysis.report.section import Section
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text, with_tables
+from device.words import how_many
 from experiments.config.door import ConfigError, EligibilityConfig, at_key, participant_codes, read_toml
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -136,7 +137,7 @@ def sections(found: DesignCheck | StudyCheck) -> tuple[Section, ...]:
         return design_sections(found)
     asked = found.eligibility.model_dump(mode="json", exclude_none=True)
     rules = "; ".join(f"{key} {_listed(value)}" for key, value in asked.items() if value)
-    title = f"Study: {found.study}, {found.participants} participants; eligibility: {rules or 'everyone'}"
+    title = f"Study: {found.study}, {how_many(found.participants, 'participant')}; eligibility: {rules or 'everyone'}"
     return Section(title=title), *(section for one in found.experiments for section in sections(one))
 
 

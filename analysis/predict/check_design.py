@@ -14,7 +14,7 @@ from analysis.report.section import Section, Table
 from analysis.report.serial import OPTIONAL, written
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
 from device.methods import Method
-from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
+from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse, how_many
 from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -237,10 +237,10 @@ def design_sections(found: DesignCheck) -> tuple[Section, ...]:
     """What a design means, for a person."""
     minutes, stated = found.duration_s / 60, found.stated_duration_s / 60
     a8 = found.exposure
-    duration = f"{found.trials} trials, {minutes:.1f} min planned"
+    duration = f"{how_many(found.trials, 'trial')}, {minutes:.1f} min planned"
     if found.least_trials < found.trials:
-        least = f"{found.least_trials} trials, {found.least_duration_s / 60:.1f} min at the least"
-        duration = f"{least}; {found.trials} trials, {minutes:.1f} min at the most"
+        least = f"{how_many(found.least_trials, 'trial')}, {found.least_duration_s / 60:.1f} min at the least"
+        duration = f"{least}; {how_many(found.trials, 'trial')}, {minutes:.1f} min at the most"
     duration += f" ({stated:.3g} min stated), of which breaks {found.break_s:g} s"
     orders = (
         f"Orders    of sessions, or of the first {_TRIALS_SHOWN} trials where there is one session, as drawn with seed "

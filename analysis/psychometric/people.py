@@ -13,6 +13,7 @@ from analysis.psychometric.priors import Priors
 from analysis.report.serial import OPTIONAL, UNWRITTEN
 from analysis.stats.arrays import FloatArray
 from analysis.stats.frames import Result
+from device.words import how_many
 
 FEWEST_ANSWERS = 10
 """Fewer trials than this are not fitted (assumed): a function has three parameters or four."""
@@ -76,7 +77,7 @@ def person_fit(
 ) -> PersonFit:
     """The answers with their function, or with the reason why there is none; `span` as in `psychometric_fit`."""
     if answers.trials < FEWEST_ANSWERS or len(answers.points) < 2:
-        counted = f"{answers.trials} trials at {len(answers.points)} level{'' if len(answers.points) == 1 else 's'}"
+        counted = f"{how_many(answers.trials, 'trial')} at {how_many(len(answers.points), 'level')}"
         return replace(answers, reason=f"{counted}; a fit needs at least {FEWEST_ANSWERS} at two levels")
     fit = psychometric_fit(
         [point.level for point in answers.points],

@@ -19,6 +19,7 @@ from analysis.summary.results import DesignSummary, Origin
 from analysis.summary.sections.pictures import functions_figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from analysis.summary.thresholds import LevelledAnswers, Thresholds, fitted_thresholds
+from device.words import how_many
 from experiments.config.door import load
 from experiments.config.setup import sha256
 from experiments.record import storage
@@ -96,7 +97,7 @@ def thresholds_in_short(found: MappedThresholds) -> Section:
     summary = found.summary
     items = tuple(threshold_sentences(summary, summary.questions[_ASKED]))
     return Section(
-        title=f"{found.thresholds.people} participants", items=items or ("One participant: see the report.",)
+        title=how_many(found.thresholds.people, "participant"), items=items or ("One participant: see the report.",)
     )
 
 

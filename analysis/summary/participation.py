@@ -10,6 +10,7 @@ from itertools import groupby
 from analysis.logs.exclusions import LeftOut
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
+from device.words import how_many
 from experiments.study.study import by_code
 
 
@@ -112,7 +113,7 @@ def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:
     told = sorted((one for one in excluded if not one.file), key=_rule)
     for (experiment, rule, remedy), some in groupby(told, key=_rule):
         people = [f"{one.participant} ({one.reason})" for one in some]
-        count = f"{len(people):,} participant{'' if len(people) == 1 else 's'}"
+        count = how_many(len(people), "participant")
         if len(people) > _NAMED:
             people[_NAMED:] = [f"and {len(people) - _NAMED:,} more, all named in statistics.json"]
         yield f"left out of {experiment}: {count} (rule: {rule}): {', '.join(people)}; {remedy}"

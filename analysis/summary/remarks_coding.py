@@ -32,6 +32,7 @@ from pydantic import Field, model_validator
 from analysis.logs.patterns import Pattern, holding
 from analysis.report import apa
 from analysis.report.section import Section, Table
+from device.words import how_many
 from experiments.config.door import ConfigError, Model, load, why_unread
 
 _NonEmpty = Annotated[str, Field(min_length=1)]
@@ -171,10 +172,11 @@ def coding_section(coded: CodedRemarks) -> Section:
     rows = tuple(
         (one.label, one.code, one.method or "any", str(one.count), apa.percent(one.share)) for one in coded.codes
     )
+    people = how_many(coded.n, "participant")
     text = (
-        f"{coded.described} of {coded.n} participants described something, in {coded.remarks} remarks; {coded.uncoded} "
+        f"{coded.described} of {people} described something, in {coded.remarks} remarks; {coded.uncoded} "
         "of these got no code from their words. A participant counts once a code; percentages are of all "
-        f"{coded.n} participants."
+        f"{people}."
     )
     header = ("Remark", "Code", "Method", "Participants", "Share")
     return Section(

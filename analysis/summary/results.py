@@ -26,6 +26,7 @@ from analysis.summary.remarks_coding import CodedRemarks
 from analysis.summary.requests import Requested
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
+from device.words import how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import level_words
 from experiments.record.tables import DataKind
@@ -226,7 +227,7 @@ class WithinStatistics:
     @property
     def people(self) -> str:
         """How many took part; said so if nobody of flesh answered."""
-        return f"{self.n:,} {'synthetic ' if self.origin.synthetic else ''}participant{'' if self.n == 1 else 's'}"
+        return how_many(self.n, "synthetic participant" if self.origin.synthetic else "participant")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,7 @@ from analysis.stats.arrays import FloatArray
 from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, Estimate, fit
 from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
+from device.words import how_many
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,7 +252,7 @@ def sampled_fit(own: OwnTrials) -> SampledFit:
     some = own.of(np.isin(own.person, chosen)) if count < codes.size else own
     n = some.time_s.size
     if n < FEWEST_TRIALS:
-        reason = f"{n} trials with a time of the answerer's own; the fit needs at least {FEWEST_TRIALS}"
+        reason = f"{how_many(n, 'trial')} with a time of the answerer's own; the fit needs at least {FEWEST_TRIALS}"
         return SampledFit(people=codes.size, fitted=0, trials=n, each=None, together=None, reason=reason)
     trials = as_trials(some)
     together = fit(trials, by_person=count > 1)

@@ -8,6 +8,7 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
+from device.words import how_many
 from experiments.clock import date_text
 from experiments.session.duration import end_text
 from experiments.watch.folder import Watched
@@ -106,7 +107,7 @@ def _progress(row: RunRow) -> str:
     return (
         f"<p class=where>{escape(row.where)}</p>"
         f'<progress max="{row.planned}" value="{row.done}" aria-label="trials done"></progress>'
-        f"<p class=count>{row.done} of {row.planned} trials done</p>"
+        f"<p class=count>{row.done} of {how_many(row.planned, 'trial')} done</p>"
     )
 
 
@@ -150,8 +151,8 @@ def _faults_text(row: RunRow) -> str:
 def _line(row: RunRow) -> str:
     """A finished run."""
     when = "" if row.virtual else f", {date_text(row.last_utc)}"
-    faults = f", {row.faults} fault{'' if row.faults == 1 else 's'}" if row.faults else ""
-    said = f"{_what(row)}: {row.done} of {row.planned} trials{faults}{when}"
+    faults = f", {how_many(row.faults, 'fault')}" if row.faults else ""
+    said = f"{_what(row)}: {row.done} of {how_many(row.planned, 'trial')}{faults}{when}"
     return f"<li><b>{escape(row.name)}</b> {escape(said)}</li>"
 
 

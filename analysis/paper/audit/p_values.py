@@ -145,7 +145,7 @@ def p_against_statistic(
     print as `value` are taken, and p falls as they rise. Reading: the other number of sides (t, r, z).
     "not attainable" too where nothing that the statistic can be prints as `value`: a correlation of 1.2, an F below 0.
     "undecided" within the numerical margin of the tail's bounds. `ValueError`: text that is no number, a bound as the
-    statistic's own value, degrees of freedom that are wrong, a bound or a percentage.
+    statistic's own value, degrees of freedom that are wrong, a bound or a percentage; one side of what has none.
     Source: Nuijten et al. 2016, Behavior Research Methods 48, 1205.
 
     >>> p_against_statistic("t", "2.20", ["28"], ".036").verdict
@@ -153,6 +153,8 @@ def p_against_statistic(
     """
     number, printed, freedom = read_printed(value), read_printed(p), [read_plain(text).value for text in df]
     check_df(statistic, freedom)
+    if sides == "one-sided" and statistic not in SIDED:
+        raise ValueError(f"sides is one-sided; only {', '.join(SIDED)} have sides, not {statistic}: leave it out")
     if number.relation != "=":
         raise ValueError(f"the statistic must be a number, not the bound {number.text}")
     shown = f"{statistic}({', '.join(df)}) = {number.text}, p {_shown(printed)}"

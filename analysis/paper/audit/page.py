@@ -14,6 +14,7 @@ from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, P
 from analysis.paper.paper import ComparisonRow, ComparisonVerdict, Prediction
 from analysis.report.section import Section, Table
 from analysis.report.serial import beside
+from device.words import how_many
 
 _AUDIT_VERDICTS: tuple[AuditVerdict, ...] = get_args(AuditVerdict)
 
@@ -38,16 +39,12 @@ def sections(findings: Sequence[AuditFinding], origin: Sequence[tuple[str, str]]
 
 def _summary(findings: Sequence[AuditFinding]) -> Section:
     rows = tuple((verdict, str(count), _MEANING[verdict]) for verdict, count in counts(findings).items() if count)
-    caption = f"{_how_many(findings)}, each with its verdict"
+    caption = f"{how_many(len(findings), 'number')}, each with its verdict"
     return Section(
         title="Verdicts",
         paragraphs=(FAIRNESS,),
         tables=(Table(caption=caption, header=("Verdict", "Numbers", "What it means"), rows=rows),),
     )
-
-
-def _how_many(findings: Sequence[AuditFinding]) -> str:
-    return f"{len(findings)} number{'' if len(findings) == 1 else 's'}"
 
 
 _MEANING = {
@@ -140,7 +137,9 @@ def findings_text(findings: Sequence[AuditFinding]) -> str:
     ]
     asked = [f"{f.place}, “{f.quote}”: {' '.join(sentences(f))}" for f in findings if f.result.verdict in _IN_FULL]
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts(findings).items() if count)
-    return "\n".join([*lines, "", f"{_how_many(findings)}: {told or 'none'}.", *(f"\n{text}" for text in asked)])
+    return "\n".join(
+        [*lines, "", f"{how_many(len(findings), 'number')}: {told or 'none'}.", *(f"\n{text}" for text in asked)]
+    )
 
 
 def cut(text: str, most: int) -> str:

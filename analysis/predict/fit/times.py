@@ -30,6 +30,7 @@ from analysis.times.fit import EDGE, AnsweredBy, DiffusionFit, Estimate, answere
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import FEWEST_TRIALS, MeanEstimate, as_trials, fit_people
+from device.words import how_many
 from experiments.config.door import ConfigError, load
 from experiments.record import storage
 from experiments.study.folders import PlaceError
@@ -140,10 +141,12 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     methods = names.ordered(map(str, logs.trials["method"].cat.categories))
     own = own_trials(logs.trials, methods)
     if not own.time_s.size:
-        reasons = [f"{count} trials: {REFUSALS[name]}" for name, count in own.refused.items()]
+        reasons = [f"{how_many(count, 'trial')}: {REFUSALS[name]}" for name, count in own.refused.items()]
         raise PlaceError("\n".join([f"no response time in {where} is the participant's own", *reasons, NO_OWN_TIMES]))
     if own.time_s.size < FEWEST_TRIALS:
-        raise PlaceError(f"{own.time_s.size} response times in {where}; the fit needs at least {FEWEST_TRIALS}")
+        raise PlaceError(
+            f"{how_many(own.time_s.size, 'response time')} in {where}; the fit needs at least {FEWEST_TRIALS}"
+        )
     return own
 
 
@@ -189,7 +192,7 @@ def in_short(found: TimesFit, labels: Mapping[str, str]) -> Section:
     """What a reader looks for, in a few lines, the methods under their labels."""
     with labelled(labels):
         return Section(
-            title=f"The diffusion model fitted to {found.trials} trials of {_people_count(found)}",
+            title=f"The diffusion model fitted to {_counted(found)}",
             items=tuple(_lines(found)),
         )
 
@@ -229,16 +232,15 @@ def _without_lapses(profiles: Mapping[str, tuple[float, float]]) -> str:
 def left_out(found: TimesFit) -> Iterator[str]:
     """What was left out, in words."""
     for one in found.refused.values():
-        yield f"{one.trials} of {found.answered} answered trials: {one.reason}"
+        yield f"{one.trials} of {how_many(found.answered, 'answered trial')}: {one.reason}"
     if found.together.reason:
         yield f"intervals of all trials together: {found.together.reason}"
     for who in found.left_out:
         yield f"participant {who}, of the mean over people: a method or instruction is missing, or the fit has no peak"
 
 
-def _people_count(found: TimesFit) -> str:
-    n = len(found.people)
-    return f"{n} participant{'' if n == 1 else 's'}"
+def _counted(found: TimesFit) -> str:
+    return f"{how_many(found.trials, 'trial')} of {how_many(len(found.people), 'participant')}"
 
 
 def _interval(one: MeanEstimate | Estimate, digits: int = 3) -> str:
@@ -269,7 +271,7 @@ def _estimates(found: TimesFit, remarks: Sequence[Problem]) -> Section:
     return Section(
         title="Estimates",
         paragraphs=(
-            f"{found.trials} trials of {_people_count(found)} with times of their own; lapses: {found.lapses}; "
+            f"{_counted(found)} with times of their own; lapses: {found.lapses}; "
             f"start {'fitted' if found.bias else 'held at one half'}.",
             *_undetermined(found),
             *(f"Used, but: {below(remark, Path())}." for remark in remarks),

@@ -15,6 +15,7 @@ from analysis.summary.sections.content import TWO_PEOPLE, ReportData
 from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
+from device.words import how_many
 from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
@@ -66,7 +67,7 @@ def _standing(question: QuestionSummary, test: DesignTest) -> str:
 
 def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) -> Iterator[str]:
     """What a design gave, a paragraph a question; `exact`: with p-values in full."""
-    people = f"{found.n:,} {'synthetic ' if found.origin.synthetic else ''}participant{'' if found.n == 1 else 's'}"
+    people = how_many(found.n, "synthetic participant" if found.origin.synthetic else "participant")
     for asked, question in found.questions.items():
         if question.cells:
             tests = [*_tests_words(question, exact=exact)]
@@ -192,7 +193,7 @@ def _assumed(found: DesignSummary) -> tuple[str, ...]:
 
 def _words(found: DesignSummary) -> Iterator[str]:
     for name, said in found.words.items():
-        yield f"{name}: {said} answer{'' if said == 1 else 's'} in words; they stand in the logs."
+        yield f"{name}: {how_many(said, 'answer')} in words; they stand in the logs."
 
 
 def lacking_conditions(found: DesignSummary) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table, s
 from analysis.summary.participation import PeopleOfExperiment
 from analysis.summary.results import DesignSummary, Origin, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
+from device.words import how_many
 
 _NAMED = 12
 """So many lines of who was left out stand on top, and so many people in a line; all are in the appendix."""
@@ -100,15 +101,6 @@ def _people_table(report: ReportData, parts: tuple[Analysed, ...]) -> Table:
             for place, one in enumerate(parts)
         ),
     )
-
-
-def how_many(number: int, noun: str) -> str:
-    """So many of them.
-
-    >>> how_many(1, "log file"), how_many(1_200, "log file")
-    ('1 log file', '1,200 log files')
-    """
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def _answers(origin: Origin) -> str:

@@ -13,6 +13,7 @@ from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.designs import lacking_conditions
 from analysis.summary.summary import UNDEFINED
 from analysis.times.own_trials import ResponseTimes
+from device.words import how_many
 
 
 def quality_section(report: ReportData) -> Iterator[Section]:
@@ -85,8 +86,8 @@ def undefined_numbers(report: ReportData) -> Iterator[Section]:
 def _times_sentence(times: ResponseTimes) -> str:
     """How many response times there are, and which are none."""
     left_out = (
-        f"{times.left_out:,} answered trials have none: there is no time in the log, or it is 0, or the answer was "
-        "entered or corrected by the experimenter, whose hand tells nothing of the participant's time."
+        f"None in {how_many(times.left_out, 'answered trial')}: there is no time in the log, or it is 0, or the answer "
+        "was entered or corrected by the experimenter, whose hand tells nothing of the participant's time."
     )
     if not times.n:
         return f"There is no valid response time, and so no figure of them. {left_out}"

@@ -18,6 +18,7 @@ from analysis.stats.random_intercept import RandomInterceptLogit
 from analysis.summary.requests import Requested, RequestKind
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.supplement import bayes_cell
+from device.words import how_many
 
 _DIGITS = 3
 
@@ -28,7 +29,7 @@ def requested_sections(report: ReportData) -> Iterator[Section]:
         table = _table(one)
         yield Section(
             title=f"Requested: {_NAMES[one.kind]}, {_data(one)}",
-            paragraphs=(named(f"{one.people} participants. {one.note} {_told(one)}".strip()),),
+            paragraphs=(named(f"{how_many(one.people, 'participant')}. {one.note} {_told(one)}".strip()),),
             tables=(table,) if table else (),
         )
 
@@ -59,9 +60,9 @@ def _told(one: Requested) -> str:
             return f"BF10 {factor}." if factor[0] in "<>" else f"BF10 = {factor}."
         case LinearMixedModel():
             spread = f"SD between people {_number(result.person_sd)}, of single trials {_number(result.residual_sd)}"
-            return f"{spread}; {result.trials} trials."
+            return f"{spread}; {how_many(result.trials, 'trial')}."
         case RandomInterceptLogit():
-            return f"SD of people's log odds {_number(result.person_sd)}; {result.trials} trials."
+            return f"SD of people's log odds {_number(result.person_sd)}; {how_many(result.trials, 'trial')}."
         case Equivalence():
             return _equivalence_words(result)
 

@@ -16,6 +16,7 @@ from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.pictures import functions_figure_of, tracks_figure_of
 from analysis.summary.thresholds import ConditionFit, Thresholds
+from device.words import how_many
 from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
@@ -105,7 +106,7 @@ def _who(of: Thresholds) -> Iterator[str]:
             "`recoil analyze --fits` fits everybody. The points of the group are of all people."
         )
     if of.even:
-        yield f"{of.even:,} trials had the same level in both intervals, and tell nothing of a choice."
+        yield f"{how_many(of.even, 'trial')} had the same level in both intervals, and tell nothing of a choice."
 
 
 def _without(of: Thresholds) -> Iterator[str]:
@@ -168,7 +169,7 @@ def _picture_of_tracks(name: str, asked: str, found: DesignSummary, of: Threshol
             f"{found.title.rstrip('.?!')}, {asked}: the levels that the answers chose, trial by trial, a panel a "
             f"participant and a line a track. Filled: {_SUCCESS[of.share]}; empty: not{ends}.{rest}"
         ),
-        alt=f"Levels by trial of {len(of.tracks)} tracks of {people} participants.",
+        alt=f"Levels by trial of {how_many(len(of.tracks), 'track')} of {how_many(people, 'participant')}.",
     )
 
 

@@ -13,6 +13,7 @@ from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, response_times_picture
 from analysis.times.people import Mean
 from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
+from device.words import how_many
 
 _UNITS = {"drift": "1/√s", "boundary": "√s", "start": "0 to 1", "non_decision_s": "s"}
 _WORDS = {"start": "start (towards forward)", "non_decision_s": "non-decision time"}
@@ -223,16 +224,16 @@ def _lower(text: str) -> str:
 
 def _used(found: DirectionStatistics, trade: SpeedAccuracy) -> str:
     """How many trials count, and whose they are."""
-    used = f"{trade.n:,} of {trade.answered:,} answered trials have a time of the answerer's own hand"
+    used = f"{trade.n:,} of {how_many(trade.answered, 'answered trial')} have a time of the answerer's own hand"
     synthetic = found.origin.synthetic
     model = " All times are synthetic: they show the model that made them, and nothing of people." if synthetic else ""
-    return " ".join([f"{used} ({_count(trade.people)}).{model}", *_refused(trade)])
+    return " ".join([f"{used} ({how_many(trade.people, 'participant')}).{model}", *_refused(trade)])
 
 
 def _refused(trade: SpeedAccuracy | NoSpeedAccuracy) -> tuple[str, ...]:
     """How many trials are refused, and why; nothing if none is."""
     refused = "; ".join(f"{one.trials:,} because {one.why}" for one in trade.refused.values())
-    return (f"Refused of {trade.answered:,} answered trials: {refused}.",) if refused else ()
+    return (f"Refused of {how_many(trade.answered, 'answered trial')}: {refused}.",) if refused else ()
 
 
 def _unpaired(trade: SpeedAccuracy) -> tuple[str, ...]:
@@ -241,10 +242,6 @@ def _unpaired(trade: SpeedAccuracy) -> tuple[str, ...]:
     if not effects or any(one.accuracy.people for one in effects):
         return ()
     return ("No participant was told two things, so no effect of an instruction is paired: compare the means below.",)
-
-
-def _count(number: int) -> str:
-    return f"{number:,} participant{'' if number == 1 else 's'}"
 
 
 def _fitted(trade: SpeedAccuracy) -> Iterator[str]:
@@ -256,10 +253,11 @@ def _fitted(trade: SpeedAccuracy) -> Iterator[str]:
     if fits.fitted < fits.people:
         whom = f"{fits.fitted} of the {fits.people:,} participants, evenly spaced in the order of their codes"
     else:
-        whom = _count(fits.fitted)
+        whom = how_many(fits.fitted, "participant")
     left_out = fits.each.left_out if fits.each else 0
     gone = f" {left_out} of their own fits have no clear peak and are left out." if left_out else ""
-    yield f"Diffusion model by maximum likelihood, {whom}, {fits.trials:,} trials.{gone} {caveats['diffusion']}"
+    of_trials = how_many(fits.trials, "trial")
+    yield f"Diffusion model by maximum likelihood, {whom}, {of_trials}.{gone} {caveats['diffusion']}"
     failed = fits.together.reason if fits.together else None
     if failed:
         yield f"All trials in one fit: {failed}."
