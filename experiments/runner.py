@@ -124,7 +124,8 @@ class _Runner:
     def __init__(self, session: steps.Session, desk: Desk) -> None:
         self._session, self._desk, self._live = session, desk, desk.live
         self._stimulus = DeskGun(desk)
-        self._failures, self._onset_s = 0, math.nan
+        self._failures = 0
+        self._onset_s: float | None = None
         self._set: dict[str, str] = {}
         """What was set by hand in this sitting; unknown at its beginning."""
 
@@ -198,9 +199,9 @@ class _Runner:
     def _answered(self, step: steps.Ask, answer: events.Answer | events.ParticipantKey) -> steps.Answered:
         """The answer with its time, which is the participant's own only by their own key, and without a pause.
 
-        Of what was felt a while ago no time says anything.
+        Of what was felt a while ago no time says anything, nor of a train, which lasts until the participant goes on.
         """
-        if step.later:
+        if step.later or self._onset_s is None:
             return steps.Answered(value=answer.response, by=answer.by)
         drawn_s = answer.response_time_s if isinstance(answer, events.Answer) else None
         key_time_s = None if answer.at_s is None else round(answer.at_s - self._onset_s, 6)
@@ -217,11 +218,13 @@ class _Runner:
             key_time_s=key_time_s if drawn_s is not None else None,
         )
 
-    def _inform(self, step: steps.Inform) -> steps.Informed | steps.Repeated:
+    def _inform(self, step: steps.Inform) -> steps.Informed | steps.Interrupted | steps.Repeated:
         self._live.enter(State.INFORMING, step)
         match self._live.wait():
             case events.Told():
                 return steps.Informed()
+            case events.Correct():  # of the answer that is told of: it is told anew
+                return steps.Interrupted(presented=False, cause="correction")
             case events.Repeat(reason=reason):
                 return self._repeat(reason)
             case other:
@@ -283,7 +286,8 @@ class _Runner:
     # the gun
 
     def _fired(self, step: steps.FireShot) -> steps.Fired | steps.Failed | steps.Interrupted:
-        outcome = self._stimulus.fire(step, self._onset_s + step.gap_s if step.gap_s else None)
+        not_before_s = self._onset_s + step.gap_s if step.gap_s and self._onset_s is not None else None
+        outcome = self._stimulus.fire(step, not_before_s)
         if isinstance(outcome, steps.Fired):
             self._onset_s = outcome.pulse_start_s
         return outcome
@@ -302,8 +306,6 @@ class _Runner:
 
 EMPTY_S = 0.05
 """So long after the key to fire nothing is felt: about as long as a gun takes to arm and fire (assumed)."""
-NOTHING = "none"
-"""The motion of no shot."""
 LEAD_S = 0.03
 """How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
 
@@ -369,7 +371,7 @@ class DeskGun:
             pulse_start_s=now_s,
             pulse_end_s=now_s,
             home_predicted_s=now_s,
-            motion=NOTHING,
+            motion=steps.NO_SHOT,
         )
 
     def present(self, step: steps.Present) -> steps.Presented | steps.Failed | steps.Interrupted:

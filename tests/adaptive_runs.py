@@ -39,6 +39,7 @@ from experiments.session.steps import (
     Answered,
     Ask,
     Failed,
+    Fired,
     FireShot,
     Interrupted,
     Outcome,
@@ -247,11 +248,19 @@ def check_rows(setup: Setup[DesignConfig], contents: Contents) -> int:
             continue
         told = told_by(replace(contents, records=contents.records[: at + 1]))
         for trial, row in zip(plan.trials, design_rows(plan, told, design), strict=True):
+            assert row.get("onset_utc") == _onset_of_the_last(told, trial)
             for question in design.questions:
                 said = _said_of_the_last(told, trial, question)
                 assert row.get(question) == (said[0] if said else None)
                 checked += said is not None
     return checked
+
+
+def _onset_of_the_last(history: History, trial: Trial) -> str | None:
+    """When the first pulse of the last presentation of a trial was felt."""
+    first = [(step, word) for step, word in history if isinstance(step, FireShot) and step.interval == 0]
+    felt = [word.onset_utc for step, word in first if step.trial == trial and isinstance(word, Fired)]
+    return felt[-1] if felt else None
 
 
 def _said_of_the_last(history: History, trial: Trial, question: str) -> tuple[AnswerValue] | None:

@@ -160,10 +160,13 @@ def _check_onsets(table: Table) -> None:
         if as_moment(text) is None:
             rule = "(rule: date and time by ISO 8601, as 2026-11-21T09:00:00Z)"
             raise BadLogError(f"{_shown(text)} is no date and time {rule}", line, "onset_utc")
-    for (before, _, _), (text, line, row) in pairwise(onsets):
-        if _moment(text) < _moment(before) and "clock-set-back" not in str(row["flags"]).split():
+    before = ""
+    for text, line, row in onsets:
+        flags = str(row["flags"]).split()
+        if before and _moment(text) < _moment(before) and "clock-set-back" not in flags:
             rule = "(rule: later, unless the flag clock-set-back says that the clock was set back)"
             raise BadLogError(f"{_shown(text)} is earlier than the onset before it {rule}", line, "onset_utc")
+        before = before if "repeated" in flags else text
 
 
 def _moment(text: str) -> datetime:

@@ -6,8 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 from experiments.config.door import ConfigError, tables
+from experiments.design.language import QuestionConfig
 from experiments.design.planning import plan_of
 from tests.designs import QUESTION, design
 
@@ -183,3 +185,9 @@ def test_the_designs_on_the_page_of_the_language_are_designs():
     for text in shown:
         config = design(**(shared | tables(text, page)))
         assert plan_of(config, "P01", 1).trials
+
+
+def test_the_steps_of_a_number_are_held_against_its_ends_where_it_has_two() -> None:
+    QuestionConfig(kind="number", text="How strong?", minimum=0.0, grain=3.0)
+    with pytest.raises(ValidationError, match="grain 3 does not divide the scale 0 to 10"):
+        QuestionConfig(kind="number", text="How strong?", minimum=0.0, maximum=10.0, grain=3.0)

@@ -234,6 +234,10 @@ BROKEN = {
         PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 0.3 ",
         ("questions.rating.grain 0.3 does not divide the scale",), "grain = ",
     ),
+    "a choice that may be skipped": Broken(
+        DIRECTION, DIRECTION, 'correct = "direction"', 'correct = "direction"\nmay_be_skipped = true',
+        ("may_be_skipped: a question of kind 'choice' always has an answer; remove the key",),
+    ),
     "grain beyond all doubles": Broken(
         PREFERENCE, PREFERENCE, "grain = 0.1 ", "grain = 1e-320 ", ("questions.rating.grain = 1e-320",), "grain = "
     ),

@@ -92,6 +92,13 @@ def test_a_track_at_the_end_of_its_range_says_so() -> None:
     assert not track_after(rule, [True, False]).at_edge
 
 
+def test_a_track_that_was_held_at_the_end_of_its_levels_is_there_until_it_takes_a_step() -> None:
+    rule = UpDown(start=1.0, steps=(2.0,), within=LevelRange(low=0, high=9), stop=TrackEnd(trials=9), down=2)
+    told = [track_after(rule, [True] * count).at_edge for count in range(5)]
+    assert told == [False, False, True, True, True]
+    assert not track_after(rule, [True, True, True, False]).at_edge
+
+
 def test_factors_multiply_and_a_higher_level_may_be_harder() -> None:
     within = LevelRange(low=0.1, high=100, factors=True, easier=-1)
     rule = UpDown(start=10.0, steps=(2.0,), within=within, stop=TrackEnd(trials=9), ratio=3.0)

@@ -66,7 +66,7 @@ _SAFE = frozenset(
     ]
 )
 """Keys whose values are words of the design, of the program or of the gun, or are written anew."""
-_SAFE_WORDS = frozenset(["break-off", "pause", EMERGENCY, GAVE_WAY, "interrupted"])
+_SAFE_WORDS = frozenset(["break-off", "pause", "correction", EMERGENCY, GAVE_WAY, "interrupted"])
 """Causes and reasons that the program gives."""
 _WRITTEN = frozenset(["value", "text", "reason", "cut_reason", "set_aside_reason"])
 """Keys of what people wrote; all else that is no safe word, as a cause that names a port, is always hidden."""

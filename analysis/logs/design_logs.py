@@ -6,7 +6,6 @@ import csv
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 import pandas as pd
@@ -21,6 +20,7 @@ from experiments.design.plan import Condition, Plan, Trial
 from experiments.rebuild import began_with
 from experiments.record import journal
 from experiments.record.design_columns import columns
+from experiments.record.design_table import went_back
 from experiments.record.journal import Head, JournalError
 from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
 from experiments.tasks.questions import correct_columns, is_right
@@ -170,15 +170,13 @@ def _check_times(design: DesignConfig, rows: Sequence[Mapping[str, object]]) -> 
 
 
 def _check_onsets(rows: Sequence[Mapping[str, object]]) -> None:
-    last: dict[object, datetime | None] = {}
-    for line, row in enumerate(rows, start=2):
-        text, before = str(row["onset_utc"] or ""), last.get(row.get("track"))
-        onset = as_moment(text) if text else before
-        if onset is None and text:
+    onsets = [str(row["onset_utc"] or "") for row in rows]
+    for line, text in enumerate(onsets, start=2):
+        if text and as_moment(text) is None:
             raise BadLogError(no_date(text), line, "onset_utc")
-        if before and onset and onset < before and CLOCK_SET_BACK not in str(row["flags"] or "").split():
-            raise BadLogError(too_early(text), line, "onset_utc")
-        last[row.get("track")] = onset
+    for place in went_back(rows, as_moment):
+        if CLOCK_SET_BACK not in str(rows[place]["flags"] or "").split():
+            raise BadLogError(too_early(onsets[place]), place + 2, "onset_utc")
 
 
 def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:

@@ -42,7 +42,7 @@ from analysis.logs.texts import (
 )
 from analysis.stats.arrays import BoolArray
 from experiments.record import tables
-from experiments.record.tables import CLOCK_SET_BACK, Column
+from experiments.record.tables import CLOCK_SET_BACK, REPEATED, Column
 
 Integers = NDArray[np.int64]
 
@@ -383,12 +383,17 @@ def _in_order(table: _Table, found: _Sessions, *, own: bool) -> _LogRule:
 
 
 def _onsets(table: _Table) -> Iterator[_LogRule]:
-    """Onsets are dates and times, and do not go back but where the log says that the clock was set back."""
+    """Onsets are dates and times, and do not go back but where the log says that the clock was set back.
+
+    As in `went_back`: what comes behind a trial that was repeated is compared with the one before that.
+    """
     found, none = onset_moments(table.texts.column("onset_utc"))
-    rows = np.flatnonzero(found >= 0)
+    rows, flags = np.flatnonzero(found >= 0), table.texts.column("flags")
+    again = np.array([REPEATED in (text or "").split() for text in flags.to_pylist()], dtype=bool)[rows]
+    last = np.maximum.accumulate(np.where(again, -1, np.arange(rows.size)))
+    before = np.concatenate([[-1], last[:-1]])[: rows.size]
     log = table.logs(rows)
-    earlier = rows[1:][(np.diff(found[rows]) < 0) & (np.diff(log) == 0)]
-    flags = table.texts.column("flags")
+    earlier = rows[(before >= 0) & (found[rows] < found[rows[before]]) & (log == log[before])]
     unsaid = [row for row in earlier.tolist() if CLOCK_SET_BACK not in (flags[row].as_py() or "").split()]
 
     def say(rule: Callable[[str], str], row: int) -> BadLogError:

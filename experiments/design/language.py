@@ -345,6 +345,8 @@ def _question_problems(question: QuestionConfig) -> Iterator[str]:
         yield 'a ranking is of a block\'s trials; say when = "block"'
     if kind == "ranking" and question.minimum_text is None:
         yield 'a ranking needs minimum_text: what rank 1 means, such as "most comfortable"'
+    if question.may_be_skipped and chosen:
+        yield f"may_be_skipped: a question of kind {kind!r} always has an answer; remove the key"
     yield from _answer_problems(question)
     yield from _number_problems(question)
 
@@ -370,6 +372,8 @@ def _number_problems(question: QuestionConfig) -> Iterator[str]:
         yield f"minimum, maximum and grain are of a rating or a number, not of kind {question.kind!r}"
     elif low is not None and high is not None and low >= high:
         yield f"minimum {low:g} and maximum {high:g}: need minimum < maximum"
+    elif low is not None and high is not None and grain is not None:
+        yield from _grain_problems(low, high, grain)
 
 
 def _doubled(key: str, table: Mapping[str, str]) -> Iterator[str]:
@@ -385,6 +389,10 @@ def _scale_problems(minimum: float | None, maximum: float | None, grain: float |
     if not -1e6 <= minimum < maximum <= 1e6:
         yield f"minimum {minimum:g} and maximum {maximum:g}: need -1e6 <= minimum < maximum <= 1e6"
         return
+    yield from _grain_problems(minimum, maximum, grain)
+
+
+def _grain_problems(minimum: float, maximum: float, grain: float) -> Iterator[str]:
     steps = (maximum - minimum) / grain
     if abs(steps - round(steps)) > 1e-9 * steps:
         yield f"grain {grain:g} does not divide the scale {minimum:g} to {maximum:g}; use a part, such as 1 or 0.5"

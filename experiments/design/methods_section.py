@@ -248,7 +248,7 @@ def _rests(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
         yield f"Sessions were {breaks.between_sessions_s:g} s apart."
     trials, most = _counts(run.trials for run in runs), _durations(run.duration_s for run in runs)
     if all(run.least_trials == run.trials for run in runs):
-        yield f"The {trials} trials took {most} as planned."
+        yield f"The {trials} trials took {most} as planned." if trials != "1" else f"The trial took {most} as planned."
     else:
         least = _durations(run.least_duration_s for run in runs)
         fewest = _counts(run.least_trials for run in runs)

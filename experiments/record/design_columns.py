@@ -114,5 +114,6 @@ def _presentation(design: DesignConfig) -> Iterator[Column]:
         )
         yield tables.EARLIER_EXPOSURE
     if design.below_break_away:
-        yield tables.text_column("status", "what the model says of the shot: `home`, `no-break-away` or `rendered`")
+        said = "what the model says of each shot of the last presentation: `home`, `no-break-away` or `rendered`"
+        yield tables.text_column("status", said)
     yield from tables.PRESENTATION

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from datetime import datetime
+from typing import TypeVar
 
 from experiments.design.config import DesignConfig
 from experiments.design.language import EMPTY, QuestionConfig
 from experiments.design.plan import CHOSEN, Plan, Trial, in_interval
+from experiments.design.procedure_problems import followed_question
 from experiments.record import tables
 from experiments.record.tables import Row
 from experiments.session import remarks
 from experiments.session.history import History, TrialHistory, by_trial, is_attempt
 from experiments.session.remarks import EntryCorrected
-from experiments.session.steps import Answered, Failed, Fired, Interrupted, Presented
+from experiments.session.steps import NO_SHOT, Answered, Failed, Fired, Interrupted, Presented
 from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import correct_columns, is_right
 
@@ -23,14 +26,23 @@ ANTICIPATION_S = 0.1
 def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]:
     """One row a planned trial, in order; what was not reached is empty."""
     rows = [_row(plan, design, trial, events) for trial, events in by_trial(plan.trials, history).items()]
-    for row in went_back(rows):
-        row["flags"] = " ".join(filter(None, (str(row["flags"]), tables.CLOCK_SET_BACK)))
-    left = [row for row in rows if row["track"] and row["attempts"] is None]
-    tracks = adaptive_tracks(design, plan, history) if left else None
-    for row in left:
-        if tracks is not None and row["track"] in tracks.over:
-            row["flags"] = " ".join(filter(None, (str(row["flags"]), tables.TRACK_OVER)))
+    for place in went_back(rows, lambda text: text or None):  # of one length, all UTC: earlier sorts first
+        _flag(rows[place], tables.CLOCK_SET_BACK)
+    for row in _over(plan, history, design, rows):
+        _flag(row, tables.TRACK_OVER)
     return rows
+
+
+def _over(plan: Plan, history: History, design: DesignConfig, rows: Iterable[Row]) -> Iterator[Row]:
+    """The rows without an answer that the track had ended before."""
+    question = followed_question(design.adaptive, design.questions) if design.adaptive is not None else None
+    left = [row for row in rows if row["track"] and row.get(question or "") is None]
+    tracks = adaptive_tracks(design, plan, history) if left else None
+    return (row for row in left if tracks is not None and row["track"] in tracks.over)
+
+
+def _flag(row: Row, flag: str) -> None:
+    row["flags"] = " ".join(filter(None, (str(row["flags"]), flag)))
 
 
 def _row(plan: Plan, design: DesignConfig, planned: Trial, events: TrialHistory) -> Row:
@@ -47,21 +59,28 @@ def _row(plan: Plan, design: DesignConfig, planned: Trial, events: TrialHistory)
         **_compared(trial),
         **_answers(design, trial, events),
         **exposure_row(events),
-        **_shown(design, events),
+        **_shown(events),
     }
 
 
-def went_back(rows: Iterable[Row]) -> Iterator[Row]:
-    """The rows whose stimulus has an earlier date and time than the last one before: the clock was set back.
+Moment = TypeVar("Moment", str, datetime)
 
-    Of adaptive tracks the last one before in the track, as one that goes on after a correction comes late in its set.
+
+def went_back(rows: Iterable[Mapping[str, object]], moment: Callable[[str], Moment | None]) -> Iterator[int]:
+    """Where the stimulus has an earlier date and time than the last one before: the clock was set back.
+
+    Of adaptive tracks the last one before in the track, as one that goes on after a correction comes late in its set. A
+    trial that was repeated may come later than those behind it, so that these are not compared with it.
     """
-    before: dict[object, str] = {}
-    for row in rows:
-        onset = str(row.get("onset_utc") or "")  # of one length, all UTC: earlier sorts first
-        if onset and onset < before.get(row.get("track"), ""):
-            yield row
-        before |= {row.get("track"): onset} if onset else {}
+    before: dict[object, Moment] = {}
+    for place, row in enumerate(rows):
+        onset, track = moment(str(row.get("onset_utc") or "")), row.get("track")
+        if onset is None:
+            continue
+        if track in before and onset < before[track]:
+            yield place
+        if tables.REPEATED not in str(row["flags"] or "").split():
+            before[track] = onset
 
 
 def _compared(trial: Trial) -> Row:
@@ -110,13 +129,13 @@ def exposure_row(events: TrialHistory) -> Row:
     return row | ({"earlier_exposure_s": round(sum(felt[:-1]), 6)} if felt[:-1] else {})
 
 
-def _presentation(events: TrialHistory, shown: type[Fired | Presented]) -> Row:
+def _presentation(events: TrialHistory) -> Row:
     """How a trial was presented: attempts, flags, note, onset of the last stimulus, gun. Empty if it never was."""
     attempts = sum(is_attempt(step, word) for step, word in events.items)
     notes = "; ".join(remark.text for remark in events.all(remarks.Noted))
     row: Row = {"attempts": attempts or None, "flags": " ".join(_flags(events)), "note": notes}
-    stimulus = events.last(shown)
-    return row | ({"onset_utc": stimulus.onset_utc, "gun": stimulus.gun} if stimulus else {})
+    first = next(iter(events.stimulus), None)
+    return row | ({"onset_utc": first.onset_utc, "gun": first.gun} if first else {})
 
 
 def _flags(events: TrialHistory) -> list[str]:
@@ -125,7 +144,7 @@ def _flags(events: TrialHistory) -> list[str]:
         "device-error": bool(events.all(Failed)),
         "interrupted": any(one.presented and one.cause == "break-off" for one in events.all(Interrupted)),
         "paused": any(one.presented and one.cause == "pause" for one in events.all(Interrupted)),
-        "repeated": events.repeated,
+        tables.REPEATED: events.repeated,
         "corrected": any(_is_corrected(events.entered(name)) for name in events.questions),
         "not-delivered": any(one.mark in remarks.NOT_DELIVERED for one in _last_measured(events)),
     }
@@ -144,16 +163,20 @@ def _is_corrected(entered: list[Answered | EntryCorrected]) -> bool:
     return bool(entered) and isinstance(entered[-1], EntryCorrected)
 
 
-def _shown(design: DesignConfig, events: TrialHistory) -> Row:
+def _motions(events: TrialHistory) -> str:
+    """What the model says of each shot of the last presentation; an empty interval has none."""
+    return " ".join(one.motion for one in events.stimulus if isinstance(one, Fired) and one.motion != NO_SHOT)
+
+
+def _shown(events: TrialHistory) -> Row:
     """How the trial was presented. A first answer that came sooner than anybody reacts is marked."""
-    row = _presentation(events, Presented if design.trial.kind == "train" else Fired)
-    if (fired := events.last(Fired)) is not None:
-        row |= {"status": fired.motion}
+    row = _presentation(events) | {"status": _motions(events)}
     if events.at_edge:
-        row |= {"flags": " ".join(filter(None, (str(row["flags"]), tables.AT_EDGE)))}
+        _flag(row, tables.AT_EDGE)
     given = next((word for _, word in reversed(events.counting) if isinstance(word, Answered)), None)
     if given is None or given.by != "participant" or given.response_time_s is None:
         return row
     if given.response_time_s >= ANTICIPATION_S:
         return row
-    return row | {"flags": " ".join(filter(None, (str(row["flags"]), "anticipation")))}
+    _flag(row, "anticipation")
+    return row

@@ -95,8 +95,8 @@ FLAGS = text_column(
     "marks set on the trial, separated by a blank: `device-error`, `interrupted` (the run broke off), `paused`, "
     "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), `clock-set-back` (the "
     "computer's date and time went back since the trial before), `at-edge` (a procedure chose the end of its levels, "
-    "and may have gone on), `track-over` (not presented: the track had ended), `not-delivered` (a sensor says so of "
-    "the last presentation), and the experimenter's own",
+    "and may have gone on), `track-over` (not presented, or not again: the track had ended), `not-delivered` (a sensor "
+    "says so of the last presentation), and the experimenter's own",
 )
 NOTE = text_column("note", "the experimenter's note")
 ONSET = text_column(
@@ -123,12 +123,14 @@ def data_kind(*, synthetic: bool, simulated: bool) -> DataKind:
 
 PRESENTATION = (ATTEMPTS, FLAGS, NOTE, ONSET, GUN)
 """How a trial was presented: the last columns of every table."""
+REPEATED = "repeated"
+"""The flag of a trial that was asked to be presented again."""
 CLOCK_SET_BACK = "clock-set-back"
 """The flag of a trial whose stimulus has an earlier date and time than the one before it."""
 AT_EDGE = "at-edge"
 """The flag of a trial whose level is the end of those that its procedure can choose."""
 TRACK_OVER = "track-over"
-"""The flag of a trial that was not presented, as its track had ended by the answers before."""
+"""The flag of a trial that was not presented, or not again, as its track had ended by the answers before."""
 EARLIER_EXPOSURE = seconds_column(
     "earlier_exposure_s",
     "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if it "

@@ -22,7 +22,7 @@ from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
 from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step, what
+from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step
 
 if TYPE_CHECKING:
     from experiments.design.plan import Plan
@@ -38,7 +38,6 @@ _HALTED = (
     "Unless the gun says that it is disarmed, SWITCH OFF ITS POWER.\n"
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
-_HOW = {Rate: "a number, or none", Describe: "the words"}
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S = 1.0
 
@@ -163,10 +162,10 @@ class TerminalScreen:
     def _correction(self, entry: Asking) -> str:
         told = self._live.history if self._live else ()
         was = texts.value_text(entry, entered_value(told, entry))
-        how = _keys(entry) if isinstance(entry, Ask) else _HOW[type(entry)]
+        undo = "/undo" if isinstance(entry, Describe) else "undo"
         return (
-            f"\n  Correct the {what(entry)} of {texts.place_text(self._plan, entry.trial)} (entered: {was}): {how}; "
-            "`undo` goes further back, Enter leaves it: "
+            f"\n  Correct the {texts.entry_name(told, entry)} of {texts.place_text(self._plan, entry.trial)} "
+            f"(entered: {was}): {_how(entry)}; `{undo}` goes further back, Enter leaves it: "
         )
 
     # what is typed
@@ -349,6 +348,17 @@ def _typed_rating(line: str, asked: Rate) -> float | str | None:
     if line.lower() == "none":
         return None
     return texts.typed_rating(line, asked)
+
+
+def _how(entry: Asking) -> str:
+    """How an entry is corrected."""
+    match entry:
+        case Ask():
+            return _keys(entry)
+        case Rate():
+            return "a number, or none" if entry.may_be_skipped else "a number"
+        case Describe():
+            return "the words"
 
 
 def _correction(line: str, position: Position) -> Event | str:

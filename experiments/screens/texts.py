@@ -6,6 +6,7 @@ Neither correctness nor a score is in here, nor a method's name.
 from __future__ import annotations
 
 import math
+import re
 import unicodedata
 
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
@@ -133,7 +134,7 @@ def value_text(asked: Asking, said: AnswerValue) -> str:
     if said is None:
         return phrase("no answer")
     if isinstance(said, float):
-        return f"{said:g}"
+        return f"{said:.15g}"
     return asked.label(said).upper() if isinstance(asked, Ask) else f"“{said}”"
 
 
@@ -157,10 +158,16 @@ def about_text(plan: Plan, asked: Asking, messages: ParticipantMessages = ENGLIS
     return ordinal(plan, asked.trial, messages) if asked.later else phrase("Trial {trial}", trial=asked.trial.trial)
 
 
+def entry_name(told: History, entry: Asking) -> str:
+    """What an entry is called: by its question's name where several are asked."""
+    several = len({step.question for step, _ in told if isinstance(step, Asking)}) > 1
+    return f"{what(entry)} “{entry.question}”" if several else what(entry)
+
+
 def entry_text(plan: Plan, told: History, entry: Asking) -> str:
     """An entry with what it says."""
-    about = about_text(plan, entry)
-    name = about if isinstance(entry, Ask) else f"{about}, {what(entry)}"
+    about, name = about_text(plan, entry), entry_name(told, entry)
+    name = about if name == "answer" else f"{about}, {name}"
     return f"{name}: {isolated(value_text(entry, entered_value(told, entry)))}"
 
 
@@ -169,10 +176,10 @@ def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
     entry = asked_before(told, remark)
     if entry is None or isinstance(entry, Describe):
         return phrase("description corrected")
-    value = value_text(entry, remark.value)
-    if isinstance(entry, Ask):
+    value, name = value_text(entry, remark.value), entry_name(told, entry)
+    if name == "answer":
         return phrase("corrected to {value}", value=value)
-    return phrase("{entry} corrected to {value}", entry=what(entry), value=value)
+    return phrase("{entry} corrected to {value}", entry=name, value=value)
 
 
 def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Remark) -> str:
@@ -188,7 +195,7 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
         case _ if trial is None:
             return _remark_text(plan, told, word)
         case steps.Answered() if isinstance(step, Asking):
-            return phrase("Saved. {entered}.", entered=_entered_text(plan, step, word.value))
+            return phrase("Saved. {entered}.", entered=_entered_text(plan, told, step, word.value))
         case steps.Presented():
             return phrase(
                 "Presented and saved. {shots}, {exposure_s:.1f} s.",
@@ -203,9 +210,10 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
             return ""
 
 
-def _entered_text(plan: Plan, step: Asking, value: AnswerValue) -> str:
-    said = "description" if isinstance(step, Describe) else value_text(step, value)
-    return f"{about_text(plan, step)}: {isolated(said)}"
+def _entered_text(plan: Plan, told: History, step: Asking, value: AnswerValue) -> str:
+    said, name = "description" if isinstance(step, Describe) else value_text(step, value), entry_name(told, step)
+    about = about_text(plan, step) if name == what(step) else f"{about_text(plan, step)}, {name}"
+    return f"{about}: {isolated(said)}"
 
 
 def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:
@@ -232,9 +240,10 @@ def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -
     entry = asked_before(told, remark)
     if entry is None:
         return ""
-    about = about_text(plan, entry)
+    about, name = about_text(plan, entry), entry_name(told, entry)
     if isinstance(entry, Describe):
         return phrase("Saved. {about}: description corrected.", about=about)
+    about = about if name == what(entry) else f"{about}, {name}"
     return phrase("Saved. {about} corrected to {value}.", about=about, value=value_text(entry, remark.value))
 
 
@@ -267,6 +276,9 @@ def typed_line(text: str) -> str:
     return "".join(" " if unicodedata.category(letter) == "Cc" else letter for letter in text).strip()
 
 
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
+
+
 def typed_rating(text: str, scale: Scale) -> float | str:
     """A number as people type it, comma or point, if it lies on the scale; else what to say.
 
@@ -274,8 +286,16 @@ def typed_rating(text: str, scale: Scale) -> float | str:
     """
     try:
         number = float("nan" if "_" in text else text.strip().replace(",", "."))
+        thousands = float(text.replace(",", "")) if _THOUSANDS.fullmatch(text.strip()) else math.nan
     except ValueError:
-        number = math.nan
+        number = thousands = math.nan
+    if scale.minimum <= thousands <= scale.maximum:
+        return phrase(
+            "{text} may be {number:g} or {thousands:.15g}: type it without a comma.",
+            text=text.strip(),
+            number=number,
+            thousands=thousands,
+        )
     if not scale.minimum <= number <= scale.maximum:
         return phrase("Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum)
     if number == (nearest := on_scale(number, scale)):

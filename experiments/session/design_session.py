@@ -10,25 +10,25 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import INSTRUCTION_FACTOR, TRAIN_INTERVAL, QuestionConfig
 from experiments.design.plan import Plan, Trial
-from experiments.design.procedures.choosing import ChosenLevels
 from experiments.design.stimuli import settings
-from experiments.session.history import History, of_one_set
+from experiments.session.history import History, entered_value, of_one_set
 from experiments.session.steps import (
+    Answered,
     Ask,
     Asking,
     Describe,
     FireShot,
     Inform,
+    Interrupted,
     Prepare,
     Present,
     Presenter,
     Rate,
     Rest,
     Session,
-    Step,
 )
 from experiments.session.tracks import adaptive_tracks
-from experiments.tasks.questions import choices, correct_columns, right_answer
+from experiments.tasks.questions import AnswerValue, choices, correct_columns, right_answer
 
 
 def design_session(
@@ -57,7 +57,7 @@ def design_session(
             passed = []
         passed.append(trial)
         if (here := script.due(trial)) is not None:
-            yield from _present(presenter, script, here)
+            yield from presenter.present(here)
             before = here
     if before is not None:
         yield from _block_over(presenter, script, before, passed)
@@ -67,17 +67,10 @@ def design_session(
         yield from presenter.close()
 
 
-def _present(presenter: Presenter, script: _Script, trial: Trial) -> Session:
-    """A trial, and what is told about its answer."""
-    yield from presenter.present(trial)
-    for told in script.feedback(presenter, trial):
-        yield from presenter.until_done(told)
-
-
 def _left_over(presenter: Presenter, script: _Script, passed: Sequence[Trial]) -> Session:
     """The trials that a track needs by the answers as they count now, though their places were passed."""
     while (trial := script.left(passed)) is not None:
-        yield from _present(presenter, script, trial)
+        yield from presenter.present(trial)
 
 
 def _block_over(presenter: Presenter, script: _Script, last: Trial, passed: Sequence[Trial]) -> Session:
@@ -101,7 +94,7 @@ class _Script:
 
     def __init__(self, setup: Setup[DesignConfig], plan: Plan, told: History, messages: ParticipantMessages) -> None:
         design = setup.config
-        self.design, self.gun, self.plan, self._messages = design, setup.gun, plan, messages
+        self.design, self.gun, self.plan, self._told, self._messages = design, setup.gun, plan, told, messages
         self._stimuli = {trial: tuple(self._intervals(trial)) for trial in plan.trials}
         self._asked = {
             (trial, when): tuple(self._questions(trial, when)) for trial in plan.trials for when in ("trial", "block")
@@ -129,37 +122,49 @@ class _Script:
         tracks = dict.fromkeys((one.session, one.set, one.track) for one in passed if one.track)
         return next((trial for one in tracks if (trial := self.due(self._of_track[one][0])) is not None), None)
 
-    def presentation(self, trial: Trial, attempt: int) -> Iterator[Step]:
-        """Every interval, with a hand-over where hands have something to do, then the questions.
+    def presentation(self, trial: Trial, attempt: int) -> Session:
+        """Every interval, with a hand-over where hands have something to do, then the questions and what is told.
 
         Levels that are chosen are so just before they are felt first; if the track is over by then, nothing is felt.
         """
-        chosen: ChosenLevels | None = None
+        tracks, chosen = (self._tracks if trial.track else None), None
+        if tracks is not None and tracks.is_over(trial.track):
+            return
         for step in self._stimuli[trial]:
-            if self._tracks is None or not trial.track or isinstance(step, Prepare):
+            if tracks is None or isinstance(step, Prepare):
                 yield replace(step, attempt=attempt)
                 continue
-            chosen = chosen or self._tracks.choice(trial.track)
+            chosen = chosen or tracks.choice(trial.track)
             if chosen is None:
                 return
-            levels = self._tracks.condition(chosen)
+            levels = tracks.condition(chosen)
             yield replace(step, attempt=attempt, chosen=levels, at_edge=chosen.at_edge, shown=self._shown)
-        yield from self.questions(trial, when="trial")
+        yield from self._judged(trial)
+
+    def _judged(self, trial: Trial) -> Session:
+        """What is asked about a trial at once, and whether that was right, as often as it is not told to the end."""
+        given: tuple[Asking, AnswerValue] | None = None
+        for asked in self.questions(trial, when="trial"):
+            outcome = yield asked
+            if asked.question == self._scored and isinstance(outcome, Answered):
+                given = asked, outcome.value
+        while given and (told := self._feedback(*given)) is not None:
+            if not isinstance((yield told), Interrupted):
+                return
 
     def questions(self, trial: Trial, *, when: str) -> tuple[Asking, ...]:
         """What is asked about a trial at once, or after its block."""
         return self._asked[trial, when]
 
-    def feedback(self, presenter: Presenter, trial: Trial) -> Iterator[Inform]:
-        """Whether the first scored answer was right, where the design has it told."""
-        if not self._scored or (trial, self._scored) not in presenter.said:
-            return
-        felt = self._tracks.as_felt(trial) if self._tracks is not None else trial
-        right = right_answer(self.design, self.design.questions[self._scored], felt)
-        if right is not None:
-            is_right = presenter.said[trial, self._scored] == right
-            text = self._messages.right if is_right else self._messages.wrong
-            yield Inform(text=text, what="feedback", trial=trial)
+    def _feedback(self, asked: Asking, given: AnswerValue) -> Inform | None:
+        """Whether the first scored answer is right, as it counts now; `None` where nothing is right or wrong."""
+        felt = self._tracks.as_felt(asked.trial) if self._tracks is not None else asked.trial
+        right = right_answer(self.design, self.design.questions[asked.question], felt)
+        if right is None:
+            return None
+        said = entered_value(self._told, asked) if self._told else given
+        text = self._messages.right if said == right else self._messages.wrong
+        return Inform(text=text, what="feedback", trial=asked.trial)
 
     def _intervals(self, trial: Trial) -> Iterator[Prepare | FireShot | Present]:
         last: object = None

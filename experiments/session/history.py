@@ -55,6 +55,17 @@ class TrialHistory:
         return felt is not None and felt.at_edge
 
     @property
+    def stimulus(self) -> list[steps.Fired | steps.Presented]:
+        """What was felt last: the shots of the last presentation, in their order, or its train. Empty: nothing was."""
+        found: list[steps.Fired | steps.Presented] = []
+        for step, word in reversed(self.items):
+            if isinstance(word, steps.Fired | steps.Presented):
+                found.append(word)
+                if not (isinstance(step, steps.FireShot) and step.interval):
+                    break
+        return found[::-1]
+
+    @property
     def _felt(self) -> steps.FireShot | steps.Present | None:
         done = (step for step, word in reversed(self.items) if isinstance(word, steps.Fired | steps.Presented))
         return next((step for step in done if isinstance(step, steps.FireShot | steps.Present)), None)
@@ -189,14 +200,15 @@ def _value(step: steps.Step | None, word: steps.Outcome | Remark, asked: Asking)
 
 
 def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial | None:
-    """The trial that can be presented again: the one that is asked about, else the last of the set.
+    """The trial that can be presented again: the one that is asked about, else the last of the set that was felt.
 
     It can be as long as nothing was told of it from memory, when all of its block were felt.
     """
+    told = _told_later(history)
     if isinstance(step, steps.Ask | steps.Rate):
-        return step.trial
-    told, shown = _told_later(history), _shown(history)
-    return next((trial for trial in reversed(shown) if of_one_set(trial, here) and trial not in told), None)
+        return None if step.trial in told else step.trial
+    last = (trial for trial in reversed(_felt(history)) if of_one_set(trial, here))
+    return next((trial for trial in last if trial not in told), None)
 
 
 def _told_later(history: History) -> set[Trial]:
@@ -215,12 +227,17 @@ def done(history: History, design: DesignConfig) -> set[Trial]:
 
 def felt(history: History) -> set[Trial]:
     """The trials whose stimulus is over: every interval of it, or all of a train."""
-    return {
+    return set(_felt(history))
+
+
+def _felt(history: History) -> list[Trial]:
+    """The same in the order in which they were felt last."""
+    return [
         step.trial
         for step, word in counting(history)
         if isinstance(step, steps.Present | steps.FireShot)
         and (isinstance(word, steps.Presented) or (isinstance(word, steps.Fired) and _is_last(step)))
-    }
+    ]
 
 
 def _is_last(step: steps.Step) -> bool:
@@ -233,16 +250,6 @@ def answered(history: History, questions: Collection[str]) -> set[Trial]:
     for asked in _answers_asked(counting(history)):
         found.setdefault(asked.trial, set()).add(asked.question)
     return {trial for trial, names in found.items() if names.issuperset(questions)}
-
-
-def _shown(history: History) -> list[Trial]:
-    """The trials whose stimulus is over: judged, or felt until next; in order."""
-    return [
-        trial
-        for step, word in history
-        if (isinstance(word, steps.Presented) or (isinstance(word, steps.Answered) and isinstance(step, steps.Ask)))
-        and (trial := steps.trial_of(step))
-    ]
 
 
 def of_one_set(one: Trial, other: Trial) -> bool:

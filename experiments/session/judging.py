@@ -10,7 +10,7 @@ from experiments.session import events, remarks
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
 from experiments.session.history import History, entered_value, entries, ranks_of_others, repeatable, trial_at
 from experiments.session.states import No, Position, State, after, why_after
-from experiments.session.steps import Ask, Asking, Rate, is_answer, what
+from experiments.session.steps import Ask, Asking, Inform, Rate, is_answer, what
 from experiments.tasks.questions import on_scale
 
 REARM_HELD_S = 1.0
@@ -95,8 +95,16 @@ def moved(moment: Moment, event: Event) -> Position:
         entry = moment.further_back
         serial = position.serial + (entry != before.correcting and position.serial == before.serial)
         return replace(position, correcting=entry, serial=serial)
+    if isinstance(event, events.Correct) and _is_told_of(before):
+        position = replace(position, states=(State.SAVING, *position.states[1:]))
     why = why_after(before, event)
     return position if why is None else replace(position, why=why)
+
+
+def _is_told_of(position: Position) -> bool:
+    """Whether the participant is being told of the answer that is corrected, which is not true any more."""
+    entry, told = position.correcting, position.step
+    return isinstance(told, Inform) and entry is not None and told.trial == entry.trial
 
 
 def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
@@ -126,6 +134,8 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return f"“{response}” is not among the answers."
         case events.Undo() if moment.further_back is None:
             return "There is nothing to undo in this set."
+        case events.Undo() if moment.further_back == moment.position.correcting:
+            return "There is nothing further back in this set."
         case events.Repeat() if moment.repeatable is None:
             return "There is no trial of this set to repeat now."
         case events.Repeat(trial=Trial() as trial) if trial != moment.repeatable:

@@ -6,7 +6,7 @@ Both are frozen facts. `kind` names them in the journal, from which they are rea
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -160,6 +160,10 @@ class Prepared:
     kind: Literal["prepared"] = "prepared"
 
 
+NO_SHOT = "none"
+"""The motion in an interval, or a catch trial, in which nothing is fired."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fired:
     """One shot was fired. Times are on the host's monotonic clock; home is predicted by the model.
@@ -263,11 +267,11 @@ class Interrupted:
     """The run broke off, or was paused, before this step was done: the trial is presented again.
 
     `presented` tells whether its stimulus was, or may have been, felt. Of a train that a pause ended it is known how
-    long and with how many shots.
+    long and with how many shots. A correction ends what is told of the answer that it changes: it is told anew.
     """
 
     presented: bool
-    cause: Literal["break-off", "pause"] = "break-off"
+    cause: Literal["break-off", "pause", "correction"] = "break-off"
     shots: int | None = None
     exposure_s: float | None = None
     kind: Literal["interrupted"] = "interrupted"
@@ -364,25 +368,21 @@ def step_after(session: Session, outcome: Outcome) -> Step | None:
         return None
 
 
-StepsOf = Callable[[Trial, int], Iterable[Step]]
-"""The steps of one presentation of a trial, by its number. Each is made when the one before is done."""
+Presentation = Callable[[Trial, int], Session]
+"""The steps of one presentation of a trial, by its number; none where it is not needed any more."""
 
 
 class Presenter:
-    """Presents trials and counts how often. `steps_of` says what a presentation is made of.
+    """Presents trials and counts how often. `presentation` says what one is made of."""
 
-    `said`: what was answered to each question of each trial, as it was given last.
-    """
-
-    def __init__(self, steps_of: StepsOf) -> None:
-        self._steps_of = steps_of
+    def __init__(self, presentation: Presentation) -> None:
+        self._presentation = presentation
         self._presented: Counter[Trial] = Counter()
-        self.said: dict[tuple[Trial, str], AnswerValue] = {}
 
     def present(self, trial: Trial) -> Session:
         """Present a trial until it is done; an earlier one that is to be repeated comes in between."""
         while True:
-            outcome = yield from self._attempt(self._steps_of(trial, self._presented[trial] + 1))
+            outcome = yield from self._attempt(self._presentation(trial, self._presented[trial] + 1))
             if isinstance(outcome, Repeated) and outcome.trial != trial:
                 yield from self.present(outcome.trial)
                 continue
@@ -400,12 +400,16 @@ class Presenter:
         """The end of a run, at which the last trials can still be corrected or presented again."""
         yield from self.until_done(Close())
 
-    def _attempt(self, steps: Iterable[Step]) -> Generator[Step, Outcome, Outcome]:
-        """One presentation: its last outcome, or the first that breaks it off."""
-        for step in steps:
+    def _attempt(self, presentation: Session) -> Generator[Step, Outcome, Outcome | None]:
+        """One presentation: its last outcome, or the first that breaks it off. What is told is only delayed by that."""
+        step, outcome = next(presentation, None), None
+        while step is not None:
             outcome = yield step
-            if isinstance(outcome, Failed | Interrupted | Repeated):
+            if isinstance(outcome, Failed | Repeated) or (isinstance(outcome, Interrupted) and not _is_told(step)):
                 break
-            if isinstance(step, Asking) and isinstance(outcome, Answered):
-                self.said[step.trial, step.question] = outcome.value
+            step = step_after(presentation, outcome)
         return outcome
+
+
+def _is_told(step: Step) -> bool:
+    return isinstance(step, Inform)

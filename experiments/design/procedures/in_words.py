@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from device.words import how_many
 from experiments.design.procedures.config import (
     AdaptiveConfig,
     KestenConfig,
@@ -81,9 +82,9 @@ def _prior(prior: PriorConfig) -> str:
 def end_words(table: AdaptiveConfig) -> str:
     """When a track ends, as part of a sentence: `of 40 trials`, or at the most so many and until what."""
     if isinstance(table, PairingConfig) or not (until := [*_ends(table)]):
-        return f"of {table.trials} trials"
-    least = f", after {table.least_trials} trials at the earliest" if table.least_trials else ""
-    return f"of at most {table.trials} trials, which ended {until[0]}{least}"
+        return f"of {how_many(table.trials, 'trial')}"
+    least = f", after {how_many(table.least_trials, 'trial')} at the earliest" if table.least_trials else ""
+    return f"of at most {how_many(table.trials, 'trial')}, which ended {until[0]}{least}"
 
 
 def _ends(table: NumericConfig) -> Iterator[str]:
@@ -91,7 +92,7 @@ def _ends(table: NumericConfig) -> Iterator[str]:
         if table.credible_width is not None:
             yield f"when the 95 % credible interval of the threshold was narrower than {table.credible_width:g}"
     elif table.reversals:
-        yield f"with the {table.reversals}th reversal"
+        yield f"with reversal {table.reversals}"
 
 
 def _percent(share: float) -> str:

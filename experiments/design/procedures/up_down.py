@@ -187,9 +187,11 @@ class _Walk:
         self._heading = heading
 
     def go(self, rule: UpDown | Kesten, taken: tuple[int, float]) -> None:
-        """Take a step, as far as the range lets it."""
+        """Take a step, as far as the range lets it; without one the track stays where it is, at the edge too."""
         (heading, step), within = taken, rule.within
-        wanted = within.moved(self._exact, step) if heading else self._exact
+        if not heading:
+            return
+        wanted = within.moved(self._exact, step)
         self.at_edge = not within.low <= wanted <= within.high
         self.level = within.kept(wanted)
         self._exact = self.level if isinstance(rule, UpDown) else min(max(wanted, within.low), within.high)
