@@ -85,8 +85,9 @@ def run_synthetic(
 
 
 def read_logs(*paths: str | Path, columns: str | Path | None = None, include_synthetic: bool = False) -> Logs:
-    """The logs in files and folders: `trials` and `ratings` as DataFrames, and `problems`: what was left out, and why.
+    """The logs in files and folders as DataFrames, and `problems`: what was left out, and why.
 
+    `trials` are those of the direction experiment, `ratings` of preference; `designs` has a `table` for each other one.
     `columns` is the file of a map for logs that Recoil did not write (`configs/examples/columns.toml`). All rows are of
     one `kind`: of people at a gun, of people at a simulated gun, or of synthetic participants. Logs of other kinds are
     problems; with `include_synthetic` they are logs of their own, `apart`. `RecoilError` if there is nothing that can

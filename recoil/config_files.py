@@ -269,7 +269,7 @@ def designs() -> list[str]:
 def schemas() -> dict[str, bytes]:
     """A JSON Schema of each kind of config, by file name: an editor that reads them completes and checks keys."""
     from analysis.logs.column_map import ColumnMap  # noqa: PLC0415 - the lab's own kinds come without the desk
-    from analysis.logs.exclusions import Rules  # noqa: PLC0415
+    from analysis.logs.exclusion_rules import Rules  # noqa: PLC0415
     from analysis.logs.level_map import LevelMap  # noqa: PLC0415
     from analysis.paper.paper import Paper  # noqa: PLC0415
     from analysis.summary.remarks_coding import Codebook  # noqa: PLC0415

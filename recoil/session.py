@@ -273,6 +273,14 @@ class RebuiltTable:
     messages: tuple[str, ...]
 
 
+def _holds(path: Path, data: bytes) -> bool:
+    """Whether there is a plain file with this content; of a device or a pipe nothing is read."""
+    try:
+        return storage.read(path, len(data) + 1) == data
+    except OSError:
+        return False
+
+
 def rebuild_table(path: Path) -> RebuiltTable:
     """The table of a journal, and that of what a sensor measured.
 
@@ -280,8 +288,8 @@ def rebuild_table(path: Path) -> RebuiltTable:
     """
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
-    same = table.exists() and table.read_bytes() == data
-    if table.exists() and not same:
+    same = _holds(table, data)
+    if not same and (table.exists() or table.is_symlink()):
         messages.append(f"{table}: differed from its journal and was set aside as {storage.set_aside_file(table)}")
     if not same:
         storage.write_whole(table, data)

@@ -20,7 +20,7 @@ from random import Random
 from typing import Any
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.exclusions import Rules, apply_rules
+from analysis.logs.exclusion_rules import Rules, apply_rules
 from analysis.logs.level_map import LevelMap
 from analysis.logs.reading import read_logs
 from analysis.paper.audit.run import PaperFile, audit

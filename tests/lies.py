@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.exclusions import Rules, apply_rules, left_out_by_files
+from analysis.logs.exclusion_rules import Rules, apply_rules
+from analysis.logs.exclusions import left_out_by_files
 from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit.run import audit_file
 from analysis.summary.remarks_coding import load_codebook
@@ -831,7 +832,7 @@ _RULES: tuple[_Told, ...] = (
     (
         "a method that is not there",
         ruled('[[accuracy]]\nmethod = "ramp"\nmin_share = 0.5\n'),
-        "ask for accuracy with ramp, which no direction log has",
+        "ask for accuracy with ramp, which no log with right answers has",
     ),
     (
         "bounds the wrong way round",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -275,7 +276,7 @@ def test_a_new_study_can_be_changed_and_run(recoil: Recoil, tmp_path: Path) -> N
     config = tmp_path / "pilot" / "direction.toml"
     config.write_text(config.read_text().replace('balance = "session"', 'balance = "set"'))
     assert synthetic(recoil, "--results", "pilot/results", config="pilot/direction.toml").returncode == 0
-    refused(recoil("new", "pilot"), "not empty")
+    refused(recoil("new", "pilot"), "has something in it")
 
 
 def test_balanced_orders_take_each_row_of_the_square_in_turn(recoil: Recoil, tmp_path: Path) -> None:
@@ -335,3 +336,17 @@ def test_an_interrupt_that_python_ignores_ends_a_command_all_the_same() -> None:
     ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
     assert ended.returncode == 130
     assert ended.stderr.strip() == "recoil: interrupted; what was acknowledged is on the disk"
+
+
+@pytest.mark.parametrize("kind", ["device", "pipe", "folder"])
+def test_rebuild_sets_aside_what_stands_at_the_place_of_a_table_and_is_none(
+    kind: str, recoil: Recoil, tmp_path: Path
+) -> None:
+    synthetic(recoil)
+    table = tmp_path / TABLE
+    kept = table.read_bytes()
+    table.unlink()
+    {"device": lambda: table.symlink_to("/dev/zero"), "pipe": lambda: os.mkfifo(table), "folder": table.mkdir}[kind]()
+    done = recoil("rebuild", JOURNAL)
+    assert (done.returncode, "set aside" in done.stderr) == (1, True)
+    assert table.read_bytes() == kept

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,8 @@ import pytest
 from scipy import stats
 
 from analysis.stats.anova import rm_anova, rm_tukey_hsd
+from analysis.stats.diagnostics import sphericity
+from analysis.summary.assumptions import not_spherical
 from analysis.summary.designs import summarise
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
@@ -199,3 +202,30 @@ def test_nested_factors_are_described_and_not_tested():
     table = simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 5)
     (test,) = summarise(config, table).questions["q"].tests
     assert "factors that are nested, not crossed, are not tested here" in test.reason
+
+
+def test_more_than_two_levels_within_people_have_the_p_that_does_not_take_sphericity():
+    config, laws = loaded("realism")
+    table = simulated(config, laws, 24)
+    tests = {test.effect: test for test in summarise(config, table).questions["realism"].tests}
+    scores = table.pivot_table(index="participant_id", columns=["damper", "voltage_V"], values="realism").to_numpy()
+    voltage = sphericity(scores.reshape(24, 2, 3).mean(axis=1)).greenhouse_geisser
+    assert tests["voltage_V"].epsilon == pytest.approx(voltage.epsilon, rel=1e-9)
+    assert tests["voltage_V"].p_gg == pytest.approx(voltage.p, rel=1e-6)
+    assert (tests["damper"].epsilon, tests["damper"].p_gg) == (None, None)
+    alone, laws = loaded("preference")
+    rated = simulated(alone, laws, 14)
+    scores = rated.pivot_table(index="participant_id", columns="method", values="rating").to_numpy()
+    anova = summarise(alone, rated).questions["rating"].tests[0]
+    assert anova.p_gg == pytest.approx(sphericity(scores).greenhouse_geisser.p, rel=1e-6)
+
+
+def test_a_test_whose_own_p_misleads_is_named_in_a_warning():
+    _, found = of("realism")
+    question = found.questions["realism"]
+    unlike = replace(question.tests[1], epsilon=0.55, p_gg=0.07)
+    changed = replace(found, questions={"realism": replace(question, tests=(question.tests[0], unlike))})
+    assert [*not_spherical("realism", changed)] == [
+        "realism, realism, voltage_V: sphericity does not hold (Greenhouse-Geisser epsilon 0.55, below 0.75): read the "
+        "corrected p = 0.07; Tukey's test of pairs takes sphericity too"
+    ]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from analysis.logs.exclusions import ExclusionEffect, KeptTrials, Rules, apply_rules
+import recoil
+from analysis.logs.exclusion_rules import ExclusionEffect, KeptTrials, Rules, apply_rules
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
@@ -83,7 +85,7 @@ accuracy = [{method = "vibration", min_share = 0.51}, {method = "ramp", min_shar
     found = {one.participant: (one.rule, one.reason) for one in effect.excluded}
     assert found["P02"] == ("min_kept_share", "58 of 60 trials kept (rule: at least 0.98 of them)")
     assert found["P03"] == ("accuracy", "0.5 correct with vibration (rule: at least 0.51)")
-    assert effect.warnings == ("the rules ask for accuracy with ramp, which no direction log has",)
+    assert effect.warnings == ("the rules ask for accuracy with ramp, which no log with right answers has",)
 
 
 def test_listed_participants_are_left_out_of_both_experiments_and_unknown_ones_are_named(tmp_path: Path) -> None:
@@ -137,3 +139,41 @@ def test_bad_rules_are_refused_with_file_key_value_and_rule(text: str, words: st
     with pytest.raises(ConfigError, match=r"rules[.]toml:(\d+:)? ") as refused:
         _rules(tmp_path, text)
     assert words in str(refused.value)
+
+
+OF_A_DESIGN = """
+[trials]
+response_time_min_s = 0.9
+[participants]
+max_same_response_share = 0.9
+[[excluded]]
+code = "P02"
+reason = "left-handed"
+"""
+
+
+def test_rules_hold_for_the_trials_and_people_of_any_design(tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config("stronger"), ["P01", "P02", "P03"], tmp_path / "results", seed=1)
+    logs = read_logs([tmp_path / "results"])
+    effect = apply_rules(logs, _rules(tmp_path, OF_A_DESIGN))
+    (before,), (after,) = logs.designs, effect.logs.designs
+    assert [(one.participant, one.rule, one.reason) for one in effect.excluded] == [("P02", "excluded", "left-handed")]
+    assert effect.warnings == ()
+    quick = before.table[before.table["stronger_time_s"] < 0.9]
+    assert len(quick) > 10
+    assert effect.trials["stronger"] == KeptTrials(recorded=len(before.table), kept=len(before.table) - len(quick))
+    assert sum(one["response_time_min_s"] for one in effect.dropped["stronger"].values()) == len(quick)
+    assert set(after.table["participant_id"]) == {"P01", "P03"}
+    assert after.table["stronger_time_s"].min() >= 0.9
+
+
+def test_who_says_the_same_to_every_trial_of_a_design_is_left_out_where_the_rules_say_so(tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config("stronger"), ["P01", "P02"], tmp_path / "results", seed=1)
+    logs = read_logs([tmp_path / "results"])
+    (one,) = logs.designs
+    same = one.table.assign(stronger=one.table["stronger"].where(one.table["participant_id"] == "P01", "first"))
+    effect = apply_rules(replace(logs, designs=(replace(one, table=same),)), _rules(tmp_path, OF_A_DESIGN))
+    assert ("P02", "excluded") in [(gone.participant, gone.rule) for gone in effect.excluded]
+    alone = _rules(tmp_path, "[participants]\nmax_same_response_share = 0.9\n")
+    effect = apply_rules(replace(logs, designs=(replace(one, table=same),)), alone)
+    assert [(gone.participant, gone.rule) for gone in effect.excluded] == [("P02", "max_same_response_share")]

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from analysis.logs.exclusions import IN_NO_TEST, LeftOut
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import with_everybody
-from analysis.summary.participation import PersonInExperiment
+from analysis.summary.participation import PersonInExperiment, exclusion_lines
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
@@ -168,3 +169,12 @@ def test_a_clock_that_ran_backwards_is_flagged_and_bids_counts_no_onset_after_it
     onsets = [row.split("\t")[column] for row in rows[1:]]
     assert onsets[at:] == ["n/a"] * (3 - at)
     assert all(0.0 <= float(onset) < 3600.0 for onset in onsets[:at])
+
+
+def test_of_several_questions_without_an_answer_each_person_is_told_once() -> None:
+    gone = [
+        LeftOut(experiment="odd", participant=who, reason="no answer to a, b in some condition", rule=IN_NO_TEST)
+        for who in ("P02", "P04")
+    ]
+    (line,) = exclusion_lines(gone)
+    assert line.startswith("left out of tests of odd: 2 participants (rule: a test takes who answered")

@@ -182,3 +182,15 @@ import analysis.summary.sections.sections
 assert not unused - {"matplotlib", "fontTools"} & set(sys.modules), "analyze"
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_statistics_of_any_design_are_a_frame_and_a_table_in_a_notebook(tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config("realism"), ["P01", "P02", "P03"], tmp_path, seed=1)
+    found = recoil.analyze(tmp_path)
+    frame = found.to_frame()
+    logs = recoil.read_logs(tmp_path).designs[0].table
+    cell = frame[(frame.question == "comfort") & (frame.damper == "on") & (frame.voltage_V == 20.0)]
+    mine = logs[(logs.damper == "on") & (logs.voltage_V == 20.0)].groupby("participant_id").comfort.mean()
+    assert cell["mean"].item() == pytest.approx(mine.mean())
+    assert (len(frame), cell["n"].item()) == (12, 3)
+    assert "Realism, comfort, voltage_V: F(2, 4) = " in found._repr_html_()

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import recoil as api
 from analysis.logs.reading import read_logs
+from analysis.summary.analyze import Request, result_files
 from analysis.summary.remarks_coding import Codebook, WrittenRemark, code_remarks, coding_section, load_codebook
 from experiments.config.door import ConfigError
+from experiments.load import load_setup, shipped_folder
+from experiments.synthetic.laws import WordsLaw
 from tests.conftest import Recoil
 from tests.log_files import write_study
 
@@ -134,3 +139,22 @@ def test_analyze_counts_the_codes_of_logs(recoil: Recoil, tmp_path: Path) -> Non
     (tmp_path / "codes.toml").write_text(BOOK.replace("P04", "P77"), encoding="utf-8")
     refused = recoil("analyze", "logs", "--out", "other", "--codebook", "codes.toml")
     assert (refused.returncode, "P77" in refused.stderr) == (2, True)
+
+
+def test_the_example_counts_what_was_said_to_any_question_in_words(tmp_path: Path) -> None:
+    setup = load_setup("preference")
+    assert setup.laws is not None
+    words = WordsLaw(law="words", texts=("like a real gun", "a toy"))
+    laws = setup.laws.model_copy(update={"questions": setup.laws.questions | {"comment": words}})
+    own = replace(setup, config=setup.config.model_copy(update={"design": "liking"}), laws=laws)
+    api.run_synthetic(own, ["P01", "P02"], tmp_path / "results", seed=1)
+    table = api.read_logs(tmp_path / "results").designs[0].table
+    said = table[table["comment"].str.contains("real", case=False, na=False)]
+    request = Request(
+        paths=(tmp_path / "results",), out=tmp_path / "out", codebook=shipped_folder() / "examples" / "codes.toml"
+    )
+    found = json.loads(result_files(request)["statistics.json"])["remarks"]
+    assert found["n"] == 2
+    assert found["remarks"] == (table["comment"].fillna("") != "").sum() > 0
+    real = next(one for one in found["codes"] if one["code"] == "real")
+    assert set(said["participant_id"]) <= set(real["participants"])

@@ -24,7 +24,7 @@ from analysis.archive.making import (
     preregistration_faults,
 )
 from analysis.archive.pages import CITATION, ArchivedDesign
-from analysis.logs.exclusions import Rules
+from analysis.logs.exclusion_rules import Rules
 from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing

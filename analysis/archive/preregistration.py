@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.archive.preregistration_page import Planned, page
-from analysis.logs.exclusions import Rules
+from analysis.logs.exclusion_rules import Rules
 from analysis.paper.paper import load_paper
 from analysis.report.serial import as_json
 from analysis.summary.remarks_coding import load_codebook

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from analysis.logs.exclusions import Rules, TrialRules
+from analysis.logs.exclusion_rules import Rules, TrialRules
 from analysis.summary.announced import sentences_of_tests
 from analysis.summary.requests import AnyRequest
 from experiments.config.door import EligibilityConfig, StudyConfig
@@ -105,7 +105,8 @@ def _exclusions(planned: Planned) -> Iterator[str]:
     names = [setup.config.experiment for setup in planned.setups]
     yield _listed(
         [
-            "A run that is not finished is not analysed, nor is a practice.",
+            "Of a run that was stopped before its end counts what was answered, as far as what follows lets it. A run "
+            "of which no table was made is not analysed, nor is a practice.",
             "Who is excluded by hand, in the register, is not analysed, and is listed with the reason.",
             *_incomplete(names),
             *(_rules(planned.rules) if planned.rules else ["There are no further rules for trials or participants."]),

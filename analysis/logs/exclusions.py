@@ -1,49 +1,21 @@
-"""Whose data an experiment can use: participants with every answer under every method.
-
-    [trials]                                   # trials that do not count
-    drop_flags = ["device-error", "interrupted"]
-    response_time_min_s = 0.2                  # bounds bind the participant's own times only
-    response_time_max_s = 10.0
-    drop_unanswered = true                     # without it, one unanswered trial leaves the participant out
-
-    [participants]                             # participants who do not count
-    min_kept_share = 0.8                       # of their trials, after dropping
-    max_same_response_share = 0.95             # who says always the same
-
-    [[accuracy]]                               # a method that everybody should feel
-    method = "asymmetric-2"
-    min_share = 0.6                            # of its answered trials correct, both directions
-
-    [[excluded]]                               # by code; `study` if several are read
-    code = "P03"
-    reason = "left-handed"
-
-Every key may be missing; `configs/examples/rules.toml` is there to copy. Trials are dropped first, of both experiments
-where they have the columns; then participants.
-"""
+"""Whose data an experiment can use: participants with every answer under every method."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Self
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, model_validator
 
 from analysis.logs.files import Problem, below, folder_above, name_below
-from analysis.logs.mapped_people import ShortText
 from analysis.logs.measures import MEASURES
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
-from analysis.stats.arrays import BoolArray
 from analysis.stats.cells import codes_of, places_among
-from analysis.times.own_trials import timed
-from experiments.config.door import Model, Seconds, Share
 from experiments.record.tables import is_rated
 
 
@@ -152,6 +124,8 @@ def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) ->
     return absent | lacking
 
 
+IN_NO_TEST = "a test takes who answered in every condition"
+"""The rule that leaves somebody out of tests alone."""
 FINISHED = "a run is finished"
 """The rule that leaves out who has begun."""
 
@@ -216,199 +190,3 @@ def _alone(table: pd.DataFrame, study: str) -> pd.DataFrame:
     rows = tidied(table[table[STUDY] == study]).reset_index(drop=True)
     codes = rows["participant_id"].cat.rename_categories(lambda code: str(code).removeprefix(f"{study}/"))
     return rows.assign(participant_id=codes)
-
-
-class TrialRules(Model):
-    """Which trials do not count."""
-
-    drop_flags: tuple[ShortText, ...] = ()
-    response_time_min_s: Seconds | None = None
-    response_time_max_s: Seconds | None = None
-    drop_unanswered: bool = False
-
-    @model_validator(mode="after")
-    def _bounds_leave_something(self) -> Self:
-        low, high = self.response_time_min_s, self.response_time_max_s
-        if low is not None and high is not None and low >= high:
-            raise ValueError(f"response_time_min_s = {low:g} must be below response_time_max_s = {high:g}")
-        return self
-
-
-class ParticipantRules(Model):
-    """Which participants do not count."""
-
-    min_kept_share: Share | None = None
-    max_same_response_share: Share | None = None
-
-
-class AccuracyRule(Model):
-    """How much of a method's trials a participant has to get right."""
-
-    method: ShortText
-    min_share: Share
-
-
-class ExcludedCode(Model):
-    """A participant who does not count, and why."""
-
-    code: Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,32}$")]
-    study: ShortText | None = None
-    reason: ShortText
-
-
-class Rules(Model):
-    """All rules of a file."""
-
-    trials: TrialRules = TrialRules()
-    participants: ParticipantRules = ParticipantRules()
-    accuracy: tuple[AccuracyRule, ...] = ()
-    excluded: tuple[ExcludedCode, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KeptTrials:
-    """How many trials of an experiment were recorded, and how many of them are kept."""
-
-    recorded: int
-    kept: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExclusionEffect:
-    """What rules did: the logs that are left, who was left out, and of each experiment how many trials were kept.
-
-    `dropped` counts dropped trials by experiment, person and rule.
-    """
-
-    logs: Logs
-    excluded: tuple[LeftOut, ...]
-    dropped: Mapping[str, Mapping[str, Mapping[str, int]]]
-    trials: Mapping[str, KeptTrials]
-    warnings: tuple[str, ...]
-
-
-def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:
-    """Leave out what the rules say. A trial that several rules drop counts for the first of them."""
-    excluded: list[LeftOut] = []
-    dropped: dict[str, dict[str, dict[str, int]]] = {}
-    trials: dict[str, KeptTrials] = {}
-    tables = logs.tables
-    for experiment, table in logs.tables.items():
-        if len(table):
-            kept, dropped[experiment] = _without_trials(table, rules.trials, experiment)
-            found = [*_reasons(table, kept, rules, experiment)]
-            reasons = {code: (rule, reason) for code, rule, reason in reversed(found)}  # the first rule is told
-            excluded += [
-                LeftOut(
-                    experiment=experiment,
-                    participant=code,
-                    reason=reason,
-                    rule=rule,
-                    remedy=f"change or remove `{rule}` in the file given with --rules",
-                )
-                for code, (rule, reason) in sorted(reasons.items())
-            ]
-            tables[experiment] = rows_without(kept, reasons) if reasons else kept
-            trials[experiment] = KeptTrials(recorded=len(table), kept=len(kept))
-    return ExclusionEffect(
-        logs=replace(logs, trials=tables["direction"], ratings=tables["preference"]),
-        excluded=tuple(excluded),
-        dropped=dropped,
-        trials=trials,
-        warnings=tuple(_idle(logs, rules)),
-    )
-
-
-def _without_trials(
-    table: pd.DataFrame, rules: TrialRules, experiment: str
-) -> tuple[pd.DataFrame, dict[str, dict[str, int]]]:
-    gone = np.zeros(len(table), dtype=np.bool_)
-    counts: dict[str, dict[str, int]] = {}
-    for rule, breaks in _trial_rules(table, rules, experiment):
-        new = breaks & ~gone
-        gone |= new
-        for code, count in table.loc[new, "participant_id"].astype(str).value_counts(sort=False).items():
-            counts.setdefault(str(code), {})[rule] = int(count)
-    kept = tidied(table[~gone]) if gone.any() else table
-    return kept, dict(sorted(counts.items()))
-
-
-def _trial_rules(table: pd.DataFrame, rules: TrialRules, experiment: str) -> Iterator[tuple[str, BoolArray]]:
-    """Each rule's name, and the rows that break it."""
-    if rules.drop_flags:
-        unwanted = set(rules.drop_flags)
-        marks = table["flags"].fillna("").astype(str)
-        bad = {text for text in marks.unique() if unwanted & set(text.split())}
-        yield "drop_flags", marks.isin(bad).to_numpy(dtype=np.bool_)
-    if not is_rated(experiment):
-        own = timed(table).by_own_hand
-        time = table["response_time_s"].to_numpy(dtype=np.float64)
-        if rules.response_time_min_s is not None:
-            yield "response_time_min_s", own & (time < rules.response_time_min_s)
-        if rules.response_time_max_s is not None:
-            yield "response_time_max_s", own & (time > rules.response_time_max_s)
-    if rules.drop_unanswered:
-        yield "drop_unanswered", table[MEASURES[experiment].score].isna().to_numpy(dtype=np.bool_)
-
-
-BY_HAND = "excluded"
-"""The rule that lists people."""
-
-
-def _reasons(table: pd.DataFrame, kept: pd.DataFrame, rules: Rules, experiment: str) -> Iterator[tuple[str, str, str]]:
-    """Participant, rule and reason; who is listed by hand is told so, whatever else holds of them."""
-    for listed in rules.excluded:
-        for code in _codes(table, listed):
-            yield code, BY_HAND, listed.reason
-    yield from _too_few(table, kept, rules.participants.min_kept_share)
-    if not is_rated(experiment):
-        yield from _too_uniform(kept, rules.participants.max_same_response_share)
-        for accuracy in rules.accuracy:
-            yield from _too_often_wrong(kept, accuracy)
-
-
-def _too_few(table: pd.DataFrame, kept: pd.DataFrame, least: float | None) -> Iterator[tuple[str, str, str]]:
-    """Who has too few trials left; whoever has none is gone in any case, and is to be listed."""
-    recorded = table["participant_id"].astype(str).value_counts(sort=False)
-    left = kept["participant_id"].astype(str).value_counts(sort=False).reindex(recorded.index, fill_value=0)
-    rule = f"at least {least:g} of them" if least else "at least one"
-    for code, count, of in zip(recorded.index, left.to_list(), recorded.to_list(), strict=True):
-        if count == 0 or count < (least or 0.0) * of:
-            yield str(code), "min_kept_share", f"{count} of {of} trials kept (rule: {rule})"
-
-
-def _too_uniform(kept: pd.DataFrame, most: float | None) -> Iterator[tuple[str, str, str]]:
-    if most is None:
-        return
-    forward = (kept["response"] == "forward").where(kept["response"].notna())
-    shares = forward.astype("float64").groupby(kept["participant_id"].astype(str)).mean()
-    same = shares.where(shares >= 0.5, 1.0 - shares)
-    for code, share in same[same > most].items():
-        yield str(code), "max_same_response_share", f"{share:.4g} of the answers are the same (rule: at most {most:g})"
-
-
-def _too_often_wrong(kept: pd.DataFrame, rule: AccuracyRule) -> Iterator[tuple[str, str, str]]:
-    rows = kept[kept["method"] == rule.method]
-    shares = rows["correct"].astype("float64").groupby(rows["participant_id"].astype(str)).mean()
-    for code, share in shares[shares < rule.min_share].items():
-        yield str(code), "accuracy", f"{share:.4g} correct with {rule.method} (rule: at least {rule.min_share:g})"
-
-
-def _codes(table: pd.DataFrame, listed: ExcludedCode) -> list[str]:
-    """The participants of a table that an entry means."""
-    people = table[["participant_id", STUDY]].drop_duplicates().astype(str).itertuples(index=False)
-    return [
-        str(person)
-        for person, study in people
-        if str(person).rpartition("/")[2] == listed.code and listed.study in (None, study)
-    ]
-
-
-def _idle(logs: Logs, rules: Rules) -> Iterator[str]:
-    """Entries that mean nobody: a code that is mistyped must not go unseen."""
-    for listed in rules.excluded:
-        if not any(_codes(table, listed) for table in logs.tables.values()):
-            yield f"the rules exclude {listed.code}, who has no log here"
-    for accuracy in rules.accuracy:
-        if accuracy.method not in set(logs.trials["method"]):
-            yield f"the rules ask for accuracy with {accuracy.method}, which no direction log has"

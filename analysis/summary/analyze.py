@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import pandas as pd
 from pydantic import JsonValue
 
 from analysis.logs.column_map import ColumnMap
-from analysis.logs.exclusions import ExclusionEffect, Rules, apply_rules, by_study, left_out_by_files
+from analysis.logs.exclusion_rules import ExclusionEffect, Rules, apply_rules
+from analysis.logs.exclusions import by_study, left_out_by_files
 from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
@@ -34,6 +36,7 @@ from analysis.summary.tables_out import TABLE_FILES, result_tables
 from device.words import first_few
 from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
+from experiments.design.language import METHOD_FACTOR
 from experiments.record.provenance import provenance
 
 _PARTS = 4
@@ -296,19 +299,33 @@ def _predicted(paper: Path | None) -> dict[str, Prediction]:
 
 
 def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
-    """The descriptions of experiment 2, coded. `ConfigError` if the codebook does not fit them."""
-    if statistics.preference is None:
-        raise ConfigError("the codebook: no ratings here")
-    ratings = logs.ratings
-    columns = ratings["participant_id"].astype(str), ratings["method"].astype(str), ratings["comment"].fillna("")
-    remarks = [
-        remarks_coding.WrittenRemark(participant=who, method=method, text=text)
-        for who, method, text in zip(*columns, strict=True)
-    ]
+    """What people said in their own words, coded. `ConfigError` if the codebook does not fit that."""
+    found = [*_written(logs, statistics)]
+    if not found:
+        raise ConfigError("the codebook: no question here was answered in words")
+    remarks = [remark for _, remark in found if remark is not None]
     try:
-        return remarks_coding.code_remarks(remarks, statistics.preference.participants.codes, book)
+        return remarks_coding.code_remarks(remarks, list(dict.fromkeys(who for who, _ in found)), book)
     except ValueError as error:
         raise ConfigError(f"the codebook: {error}") from error
+
+
+def _written(logs: Logs, statistics: StudyStatistics) -> Iterator[tuple[str, remarks_coding.WrittenRemark | None]]:
+    """What was asked for in words of whom: every analysed participant once at least."""
+    if statistics.preference is not None:
+        yield from ((code, None) for code in statistics.preference.participants.codes)
+        yield from _remarks_in(logs.ratings, "comment")
+    for one in logs.designs:
+        for name, question in one.design.questions.items():
+            if question.kind == "text":
+                yield from _remarks_in(one.table, name)
+
+
+def _remarks_in(table: pd.DataFrame, name: str) -> Iterator[tuple[str, remarks_coding.WrittenRemark]]:
+    methods = table[METHOD_FACTOR] if METHOD_FACTOR in table else table["participant_id"].map(lambda _: "")
+    columns = table["participant_id"].astype(str), methods.astype(str), table[name].fillna("").astype(str)
+    for who, method, text in zip(*columns, strict=True):
+        yield who, remarks_coding.WrittenRemark(participant=who, method=method, text=text)
 
 
 def _by_study(logs: Logs, *, fits: bool) -> dict[str, StudyStatistics] | None:

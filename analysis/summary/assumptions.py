@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from analysis.summary.results import Assumption, DirectionStatistics, PooledBinomial, Supplement, WithinStatistics
+from collections.abc import Iterator
+
+from analysis.summary.results import (
+    Assumption,
+    DesignSummary,
+    DirectionStatistics,
+    PooledBinomial,
+    Supplement,
+    WithinStatistics,
+)
 from device.words import first_few
 
 EPSILON = 0.75
@@ -105,3 +114,15 @@ def _log_odds(found: DirectionStatistics) -> Assumption:
     if model.few:
         warning = f"fewer than 5 right or wrong answers, so its tests are unreliable: {', '.join(map(str, model.few))}"
     return Assumption(assumption=text, warning=warning)
+
+
+def not_spherical(name: str, design: DesignSummary) -> Iterator[str]:
+    """A warning for each test of a design whose differences vary so unlike each other that its own p misleads."""
+    for question, found in design.questions.items():
+        for test in found.tests:
+            if test.epsilon is not None and test.p_gg is not None and test.epsilon < EPSILON:
+                yield (
+                    f"{name}, {question}, {test.effect}: sphericity does not hold (Greenhouse-Geisser epsilon "
+                    f"{test.epsilon:.2g}, below {EPSILON}): read the corrected p = {test.p_gg:.2g}; Tukey's test of "
+                    "pairs takes sphericity too"
+                )

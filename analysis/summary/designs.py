@@ -21,7 +21,7 @@ from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test, yes_no
 from analysis.stats.diagnostics import effect_size, unit_scaled
 from analysis.stats.discrimination import Task, discrimination
-from analysis.stats.factorial import factorial_anova
+from analysis.stats.factorial import FactorialEffect, factorial_anova
 from analysis.stats.paired import friedman
 from analysis.summary.pairs import paired_comparison
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
@@ -346,13 +346,19 @@ def _factorial(names: Sequence[str], people: pd.DataFrame, group: pd.Series | No
         if math.isnan(one.F):
             yield DesignTest(name="anova", effect=effect, reason="people do not differ in it, so there is no error")
         else:
-            yield DesignTest(name="anova", effect=effect, statistic=one.F, df=one.df, p=one.p, size=one.size)
+            test = DesignTest(name="anova", effect=effect, statistic=one.F, df=one.df, p=one.p, size=one.size)
+            yield _corrected(test, one)
+
+
+def _corrected(test: DesignTest, effect: FactorialEffect) -> DesignTest:
+    """With the p that does not take sphericity, which two levels give for nothing."""
+    return replace(test, epsilon=effect.epsilon, p_gg=effect.p_gg) if effect.df[0] > 1 else test
 
 
 def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iterator[DesignTest]:
     if question.kind != "ranking":
         anova = rm_anova(scores)
-        yield DesignTest(
+        test = DesignTest(
             name="anova",
             effect=name,
             statistic=float(anova.F),
@@ -361,6 +367,7 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
             size=effect_size(rm_anova(unit_scaled(scores))).generalized_eta_squared,
             reason=str(anova.reason) or None,
         )
+        yield test if anova.reason else _corrected(test, *factorial_anova(scores, [name]))
     if question.kind in {"rating", "ranking"}:
         ranks = friedman(scores)
         yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)

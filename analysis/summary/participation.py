@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
-from analysis.logs.exclusions import LeftOut
+from analysis.logs.exclusions import IN_NO_TEST, LeftOut
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
 from device.words import how_many
@@ -116,7 +116,8 @@ def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:
         count = how_many(len(people), "participant")
         if len(people) > _NAMED:
             people[_NAMED:] = [f"and {len(people) - _NAMED:,} more, all named in statistics.json"]
-        yield f"left out of {experiment}: {count} (rule: {rule}): {', '.join(people)}; {remedy}"
+        what = f"tests of {experiment}" if rule == IN_NO_TEST else experiment
+        yield f"left out of {what}: {count} (rule: {rule}): {', '.join(people)}; {remedy}"
 
 
 _NAMED = 100

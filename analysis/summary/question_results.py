@@ -32,7 +32,10 @@ class ConditionSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignTest:
-    """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made."""
+    """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made.
+
+    `p_gg`: of an ANOVA of more than two levels within people, corrected by `epsilon` (Greenhouse and Geisser).
+    """
 
     name: str
     effect: str
@@ -42,6 +45,8 @@ class DesignTest:
     size: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None
+    epsilon: float | None = field(default=None, metadata=OPTIONAL)
+    p_gg: float | None = field(default=None, metadata=OPTIONAL)
     reason: str | None = None
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from analysis.logs.exclusions import KeptTrials, LeftOut
+from analysis.logs.exclusion_rules import KeptTrials
+from analysis.logs.exclusions import LeftOut
 from analysis.report import apa
 from analysis.report.serial import OPTIONAL, SPREAD, NotebookResult, beside
 from analysis.stats.cells import ByParticipant
@@ -380,11 +381,15 @@ class StudyStatistics(NotebookResult):
     def rows(self) -> list[dict[str, object]]:
         """A row an experiment and method: participants, mean and SD, and the within-subject interval of the mean.
 
+        Of other designs a row a question and condition, by the levels of the factors, with the interval of a share.
         Where data of several kinds are kept apart, each row names its own.
         """
         if self.kept_apart:
             kinds = {self.data_kind: replace(self, kept_apart=None), **self.kept_apart}
             return [{"data": kind} | row for kind, one in kinds.items() for row in one.rows()]
+        return [*self._rows_of_methods(), *(row for name in self.designs for row in self._rows_of_design(name))]
+
+    def _rows_of_methods(self) -> list[dict[str, object]]:
         blank = ConfidenceInterval(ci_low=math.nan, ci_high=math.nan)
         return [
             {"experiment": name, "method": method, "n": found.n, "mean": found.means[method], "sd": found.sds[method]}
@@ -394,11 +399,26 @@ class StudyStatistics(NotebookResult):
             for ends in [(found.within_ci or {}).get(method, blank)]
         ]
 
+    def _rows_of_design(self, name: str) -> Iterator[dict[str, object]]:
+        for asked, question in self.designs[name].questions.items():
+            for cell in question.cells:
+                numbers = {"n": cell.people, "mean": cell.mean, "sd": cell.sd}
+                ends = {"ci_low": cell.ci_low, "ci_high": cell.ci_high}
+                yield {"experiment": name, "question": asked, **cell.levels, **numbers, **ends}
+
+    def _tests(self) -> Iterator[str]:
+        """Each F test, by what it is of."""
+        for name, found in self.analysed.items():
+            if (anova := found.anova) is not None:
+                yield f"{name.capitalize()}: {apa.f_test(anova.F, anova.df, anova.p)}"
+        for name, design in self.designs.items():
+            for asked, question in design.questions.items():
+                tests = (test for test in question.tests if test.name == "anova" and test.reason is None)
+                for test in tests:
+                    told = apa.f_test(test.statistic, test.df or (), test.p)
+                    yield f"{name.capitalize()}, {asked}, {test.effect}: {told}"
+
     def _repr_html_(self) -> str:
-        """The table of means with each experiment's F test, for a notebook."""
-        tests = [
-            f"<p>{name.capitalize()}: {html.escape(apa.f_test(anova.F, anova.df, anova.p))}</p>"
-            for name, found in self.analysed.items()
-            if (anova := found.anova) is not None
-        ]
-        return NotebookResult._repr_html_(self) + "".join(tests)  # super() fails in a class with slots
+        """The table of means with each F test, for a notebook."""
+        tests = "".join(f"<p>{html.escape(test)}</p>" for test in self._tests())
+        return NotebookResult._repr_html_(self) + tests  # super() fails in a class with slots

@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import pandas as pd
 
-from analysis.logs.exclusions import LeftOut, complete_rows, shared_methods
+from analysis.logs.exclusions import IN_NO_TEST, LeftOut, complete_rows, shared_methods
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
@@ -48,7 +48,7 @@ from analysis.stats.paired import (
     signed_rank_tests,
 )
 from analysis.summary import results
-from analysis.summary.assumptions import assumptions
+from analysis.summary.assumptions import assumptions, not_spherical
 from analysis.summary.designs import origin_of, summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
@@ -131,16 +131,19 @@ _NAMED = 20
 
 
 def _lacking(name: str, design: results.DesignSummary) -> Iterator[LeftOut]:
-    """Who is in no test of some question of a design."""
+    """Who is in no test of some questions of a design."""
+    lacking: dict[str, list[str]] = {}
     for question, found in design.questions.items():
         for who in found.left_out:
-            yield LeftOut(
-                experiment=name,
-                participant=who,
-                reason=f"{question}: no answer in some condition, so in no test of it",
-                rule="a test takes who answered in every condition",
-                remedy="none here; means, counts and the other questions count them",
-            )
+            lacking.setdefault(who, []).append(question)
+    for who, questions in lacking.items():
+        yield LeftOut(
+            experiment=name,
+            participant=who,
+            reason=f"no answer to {', '.join(questions)} in some condition",
+            rule=IN_NO_TEST,
+            remedy="none here; means, counts and the other questions count them",
+        )
 
 
 def statistics_versions() -> dict[str, str]:
@@ -177,6 +180,8 @@ def _warnings(found: results.StudyStatistics) -> Iterator[str]:
             yield f"{experiment}: no ANOVA and no Tukey test, which need 2 of each; {there}"
         elif one is not None:
             yield from (f"{experiment}: {entry.warning}" for entry in one.assumptions if entry.serious)
+    for name, design in found.designs.items():
+        yield from not_spherical(name, design)
     for place, value in undefined(found):
         why = "undefined (no variance to divide by, or one value only)"
         if math.isinf(value):

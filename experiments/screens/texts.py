@@ -141,8 +141,8 @@ def value_text(asked: Asking, said: AnswerValue) -> str:
 def ends_text(asked: Rate) -> str:
     """The ends of a scale in words, or which numbers may be said."""
     if asked.minimum_text or asked.maximum_text:
-        low, high = isolated(asked.minimum_text), isolated(asked.maximum_text)
-        return f"{asked.minimum:g} = {low}     {asked.maximum:g} = {high}"
+        ends = ((asked.minimum, asked.minimum_text), (asked.maximum, asked.maximum_text))
+        return "     ".join(f"{end:g} = {isolated(text)}" if text else f"{end:g}" for end, text in ends)
     low = "above 0" if 0 < asked.minimum <= _TINY else phrase("from {minimum:g}", minimum=asked.minimum)
     low = "" if asked.minimum <= -LARGEST_NUMBER else low
     high = "" if asked.maximum >= LARGEST_NUMBER else phrase("to {maximum:g}", maximum=asked.maximum)

@@ -137,7 +137,12 @@ def _anova_words(test: DesignTest, *, exact: bool) -> str:
     size = "" if test.size is None else f", generalised η² = {apa.below_one(test.size)}"
     effect = "significant effect" if test.p is not None and test.p < 0.05 else "no significant effect"
     told = apa.f_test(test.statistic, test.df or (), test.p, exact=exact)
-    return f"{effect} of {effect_words(test.effect)}, {told}{size}"
+    corrected = f", {_sphericity(test, exact=exact)}" if test.p_gg is not None else ""
+    return f"{effect} of {effect_words(test.effect)}, {told}{size}{corrected}"
+
+
+def _sphericity(test: DesignTest, *, exact: bool = False) -> str:
+    return f"Greenhouse–Geisser ε = {apa.below_one(test.epsilon)}, {apa.p_value(test.p_gg, exact=exact)}"
 
 
 def _ranks_words(test: DesignTest, *, exact: bool) -> str:
@@ -297,6 +302,7 @@ def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:
         more = apa.interval(test.ci_low, test.ci_high)
     else:
         more = apa.NO_NUMBER if test.size is None else f"η²_G = {apa.below_one(test.size)}"
+        more += f"; {_sphericity(test)}" if test.p_gg is not None else ""
     p = apa.NO_NUMBER if test.p is None else apa.p_cell(test.p)
     return (_TESTS.get(test.name, test.name), _effect(found, test), apa.number(test.statistic), df, p, more)
 

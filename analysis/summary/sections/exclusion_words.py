@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from analysis.logs.exclusions import BY_HAND, FINISHED, LeftOut
+from analysis.logs.exclusion_rules import BY_HAND
+from analysis.logs.exclusions import FINISHED, LeftOut
 from analysis.logs.kinds import IN_REGISTER, NEVER_TOGETHER
 from analysis.report import apa
 from analysis.report.labels import named

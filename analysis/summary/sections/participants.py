@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from analysis.logs.column_map import NOT_STATED
-from analysis.logs.exclusions import FINISHED, LeftOut
+from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut
 from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.report import apa
 from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table, shortened
@@ -172,8 +172,8 @@ def _rule_line(report: ReportData, entries: list[LeftOut]) -> str:
     people += [f"and {len(entries) - _NAMED:,} more"] if len(entries) > _NAMED else []
     rule = f" Rule: {first.rule}." if first.rule else ""
     remedy = f" Remedy: {first.remedy}." if first.remedy else ""
-    count = how_many(len(entries), "participant")
-    return f"{_named(report, first.experiment)}: {count} left out: {', '.join(people)}.{rule}{remedy}"
+    count, tests = how_many(len(entries), "participant"), " of tests" if first.rule == IN_NO_TEST else ""
+    return f"{_named(report, first.experiment)}: {count} left out{tests}: {', '.join(people)}.{rule}{remedy}"
 
 
 def shown_root(report: ReportData) -> str:
