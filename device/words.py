@@ -110,11 +110,15 @@ class RecoilError(Exception):
 
 
 class DeviceError(RecoilError):
-    """Anything that goes wrong with a gun."""
+    """Anything that goes wrong with a gun. `may_have_fired`: of a shot that was asked for nothing else is known."""
+
+    may_have_fired = True
 
 
 class LimitError(DeviceError, ValueError):
     """A command beyond a limit that no config can lift. Nothing was sent."""
+
+    may_have_fired = False
 
 
 class LinkError(DeviceError):

@@ -343,7 +343,7 @@ class DeskGun:
         except Held:
             return steps.Interrupted(presented=before, cause="pause")
         except DeviceError as error:
-            return self._failed(error, felt=before or (asked and not isinstance(error, LimitError)))
+            return self._failed(error, felt=before or (asked and error.may_have_fired))
         finally:
             disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
@@ -389,7 +389,7 @@ class DeskGun:
         except Held:
             return train.interrupted()
         except DeviceError as error:
-            return self._failed(error, felt=train.shots > 0 or (asked and not isinstance(error, LimitError)))
+            return self._failed(error, felt=train.shots > 0 or (asked and error.may_have_fired))
         finally:
             disarm(self._live.gun)
         return train.presented("next") if isinstance(event, events.Next) else train.interrupted()

@@ -10,7 +10,6 @@ from typing import Literal
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, with_tables
-from device.parameters import GunParameters
 from device.serial_gun.gun import MAX_SPEED
 from device.twin.core import IDENTITY
 from device.twin.sockets import Pty, Socket, Tcp
@@ -136,11 +135,9 @@ def examine(
     `PlaceError`: the gun's address has no such form; `ConfigError`: the config cannot be used.
     """
     findings, device = list[DoctorFinding](), load_gun(find(config))
-    actuators = map(device.rendering, device.methods)
-    guns = [one for one in actuators if isinstance(one, GunParameters)]
-    damped = max(guns, key=lambda one: one.friction_N, default=None)
+    methods = device.renderings(tuple(device.methods))
     limit_s = device.serial.round_trip_limit_s
-    planned = checks(results, gun, limit_s, shots=shots, sensor=sensor, damped=damped, asked=asked)
+    planned = checks(results, gun, limit_s, shots=shots, sensor=sensor, methods=methods, asked=asked)
     left_armed = ""
     with progress("doctor", len(planned)) as tell:
         try:

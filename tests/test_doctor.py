@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 from analysis.report.serial import plain
 from device import LinkError
 from device.parameters import GunParameters
+from device.plugin.conformance import ConformanceFinding
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
@@ -198,6 +199,7 @@ MACHINE = Machine(system="Linux", python="3.11.7", cores=2, versions={"numpy": "
 TICKS = Ticks(resolution_s=1e-9, smallest_step_s=4e-8, oversleep_ms=FAST)
 DISK = Appends(append_ms=FAST, free_bytes=10**10)
 LINK = GunLine(gun="RG-1:7", state="disarmed", fault=None, round_trip_ms=FAST)
+OPENING = ConformanceFinding(check="opening", kept=False, said="another program has it open")
 ADAPTER = Adapter(name="ttyUSB0", setting="sys/ttyUSB0/latency_timer", latency_ms=1)
 DISPLAY = Display(platform="xcb", width_px=1280, height_px=800, refresh_Hz=60.0, opened_ms=20.0)
 STAGE = PsychoPyStage(version="2026.2.5", import_s=8.0, opened_s=0.6, frames_Hz=444.0)
@@ -223,6 +225,10 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_link(replace(LINK, round_trip_ms=SLOW), 0.5), "good", ""),
         (verdicts.of_link(replace(LINK, state="armed"), 0.010), "fails", "switch off"),
         (verdicts.of_link(replace(LINK, fault="coil open"), 0.010), "fails", "switch off"),
+        (verdicts.of_link(replace(LINK, clock_jumps=2), 0.010), "good", ""),
+        (verdicts.of_link(replace(LINK, clock_jumps=3), 0.010), "fails", "leave ?speed out"),
+        (verdicts.of_conformance([OPENING]), "fails", "close what else has it open"),
+        (verdicts.of_conformance([replace(OPENING, check="trials")]), "fails", "nobody may hold this gun"),
         (verdicts.of_link_failure("no answer"), "fails", "cable"),
         (verdicts.of_failure("gun", "gun plug-in bad: its import failed"), "fails", "uninstall it"),
         (verdicts.of_sensor(SENSOR), "good", ""),
@@ -596,7 +602,7 @@ def test_a_display_that_nobody_serves_fails_with_what_to_do_and_stops_nothing(tm
     ],
 )
 def test_a_simulated_sensor_is_one_check_among_all(tmp_path: Path, sensor: str, verdict: str, said: str) -> None:
-    planned = checks(tmp_path, "simulated", 0.01, sensor=sensor, damped=GunParameters(friction_N=1.12))
+    planned = checks(tmp_path, "simulated", 0.01, sensor=sensor, methods={"damped": GunParameters(friction_N=1.12)})
     assert len(planned) == len(checks(tmp_path, "simulated", 0.01)) + 1
     (finding,) = next(carry_out_check(one) for one in planned if one.name == "sensor")
     assert finding.verdict == verdict

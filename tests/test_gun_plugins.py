@@ -11,7 +11,8 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import pytest
 
 from device import Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
 from device.methods import drive_of, paper_methods
+from device.parameters import GunParameters
 from device.plugin import door, guard
 from device.plugin.conformance import (
     GUN_CHECKS,
@@ -33,7 +35,7 @@ from device.plugin.conformance import (
 )
 from device.plugin.guard import GuardedGun, PluginError
 from device.simulated import SimulatedGun
-from device.words import DIRECTIONS
+from device.words import DIRECTIONS, ShotTiming
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.doctor import checks
@@ -396,6 +398,29 @@ def open_gun(address, methods, clock):
 """
 
 
+TELLING = """
+from device.simulated import SimulatedGun
+class Telling(SimulatedGun):
+    def fire(self, shot, at_s=None):
+        with open("fired.txt", "a") as file: file.write(f"{shot.method} {shot.drive.voltage_V:g} V\\n")
+        return super().fire(shot, at_s)
+def open_gun(address, methods, clock):
+    return Telling(methods, clock)
+"""
+
+
+def test_a_doctor_fires_the_methods_of_the_gun_that_it_is_given_and_no_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(monkeypatch, tmp_path, TELLING, name="telling", module="telling_gun")
+    monkeypatch.chdir(tmp_path)
+    methods = {"gentle": GunParameters(voltage_V=12.0)}
+    looks = {one.name: one for one in checks.checks(tmp_path, "telling:", 0.1, shots=3, methods=methods)}
+    (found,) = looks["shots"].look()
+    assert found.verdict == "good", found.measured
+    assert set((tmp_path / "fired.txt").read_text().splitlines()) == {"gentle 12 V"}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
     """How it ended, what it wrote on its two streams, and what the gun heard."""
@@ -554,6 +579,14 @@ class Liar(SimulatedGun):
         return replace(true, **self.lie.get("status", {}))
 
 
+def timing(**lie: Any) -> ShotTiming:
+    """How a shot at 100 s came about, told truly but for a lie."""
+    true: dict[str, Any] = dict.fromkeys(("requested_s", "written_s", "accepted_s", "pulse_start_s"), 100.0)
+    true |= {"pulse_end_s": 100.01, "acknowledged_s": 100.02, "uncertainty_s": 0.001, "gun_count": 1, "asked": 1}
+    true |= dict.fromkeys(("gun_accepted_us", "gun_start_us", "gun_end_us"), 5)
+    return ShotTiming(**true | lie)
+
+
 @pytest.fixture
 def clock():
     clock = StillClock()
@@ -579,6 +612,15 @@ def guarded(clock: Any, **lie: Any) -> tuple[GuardedGun, Liar]:
         ({"home_predicted_s": 99.0}, "it is home at 99.000000 s, before its drive ends"),
         ({"motion": None}, "its motion is None"),
         ({"motion": "up\ndown"}, "it must be a line of text"),
+        ({"motion": "m" * 100_000}, "it must be a line of text"),
+        ({"home_predicted_s": 1e9}, r"it is home 1e\+09 s later; at most 60 s"),
+        ({"timing": "soon"}, "its timing is 'soon'; it must be a ShotTiming, or None"),
+        ({"timing": timing(gun_start_us=100e6)}, "its timing.gun_start_us is 100000000.0; it must be a whole number"),
+        ({"timing": timing(gun_count=None)}, "its timing.gun_count is None"),
+        ({"timing": timing(gun_count=-5)}, "its timing.gun_count is -5"),
+        ({"timing": timing(written_s=float("nan"))}, "its timing.written_s is nan; it must be finite"),
+        ({"timing": timing(uncertainty_s=-99.0)}, "its timing.uncertainty_s is -99; it must lie between 0 and 1"),
+        ({"timing": timing(pulse_start_s=-900.0)}, "its timing.pulse_start_s is -900.000000 s; its report has 100"),
         ({"shot": a_shot("vibration")}, "ordered was Shot"),
     ],
 )
@@ -590,6 +632,31 @@ def test_a_report_that_cannot_be_is_not_believed_and_the_gun_is_disarmed(clock, 
     gun.arm()
     with pytest.raises(LimitError, match="not home yet"):  # it may have been fired
         gun.fire(a_shot())
+
+
+def test_a_report_is_written_in_plain_numbers_whatever_the_plug_in_made_it_of(clock):
+    told = timing(gun_count=np.int64(3), gun_start_us=np.int64(7), pulse_start_s=np.float32(100.0))
+    odd = {"timing": told, "pulse_start_s": Fraction(100), "pulse_end_s": np.longdouble("100.01")}
+    gun, _ = guarded(clock, report=odd)
+    report = gun.fire(a_shot())
+    numbers = [report.pulse_start_s, report.pulse_end_s, *astuple(report.timing)]
+    assert {type(one) for one in numbers} == {float, int}
+    assert report.timing.gun_count == 3
+    json.dumps(numbers, allow_nan=False)
+
+
+class Mute:
+    """An object whose own code breaks off."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError("repr")
+
+
+def test_an_object_that_cannot_be_shown_is_told_of_with_the_plug_ins_name(clock):
+    gun, liar = guarded(clock, acts=Mute)
+    with pytest.raises(PluginError, match=r"gun plug-in liar says what cannot be read .*repr"):
+        gun.fire(a_shot())
+    assert not liar.is_armed
 
 
 @pytest.mark.parametrize("acts", [lambda: None, lambda: 1 / 0, lambda: (_ for _ in ()).throw(SystemExit(3))])

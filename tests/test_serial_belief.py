@@ -222,8 +222,11 @@ def test_a_run_whose_answers_are_all_lost_once_is_recovered(tmp_path, quick_conf
 def test_a_line_too_slow_for_a_shots_time_fires_nothing(tmp_path):
     with a_pair(tmp_path, Troubles(latency_s=0.08), speed=1.0) as pair:
         pair.gun.arm()
-        with pytest.raises(LinkError, match=r"not fired: the gun's clock is known to 0\.\d+ s only.*0\.05 s or less"):
+        with pytest.raises(
+            LinkError, match=r"not fired: the gun's clock is known to 0\.\d+ s only.*0\.05 s or less"
+        ) as told:
             pair.gun.fire(a_shot())
+        assert not told.value.may_have_fired
         assert pair.twin.body.ledger == []
 
 

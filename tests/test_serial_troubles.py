@@ -330,3 +330,31 @@ def test_on_a_bad_line_every_shot_is_done_once_or_marked(tmp_path):
             assert true.way == {"forward": "FORW", "backward": "BACK"}[way]
         assert len(done) > 40
         assert {command.outcome for command in pair.commands} >= {"done", "garbled"}
+
+
+class Misread(SerialPort):
+    """A line that spoils the serial number in the first answer after it was opened again."""
+
+    opened = 0
+
+    def __init__(self, address: str) -> None:
+        super().__init__(address)
+        Misread.opened += 1
+        self._spoils = Misread.opened > 1
+
+    def read(self) -> bytes:
+        data = super().read()
+        if self._spoils and b"TWIN-1" in data:
+            self._spoils = False
+            return data.replace(b"TWIN-1", b"TWIN-11")
+        return data
+
+
+def test_a_serial_number_that_is_misread_once_is_not_another_gun(tmp_path):
+    with a_twin(tmp_path, speed=1.0) as (_, socket):
+        link = Link(lambda: socket.address, time.monotonic, open_port=Misread)
+        link.start(PATIENCE_S)
+        link.drop("the test says so")
+        wait_for(lambda: Misread.opened > 1 and link._up.is_set())
+        assert link.named.serial == "TWIN-1"
+        link.close()

@@ -18,16 +18,8 @@ from itertools import cycle, islice
 
 from device import open_gun
 from device.methods import Method, drive_of, paper_methods
-from device.plugin.guard import (
-    CLOCK_SLACK_S,
-    LENGTH_SLACK_PART,
-    LENGTH_SLACK_S,
-    GunLeftOpen,
-    PluginSilent,
-    answer_within,
-    interrupts_held,
-    start_aside,
-)
+from device.plugin.guard import GunLeftOpen, PluginSilent, answer_within, interrupts_held, start_aside
+from device.plugin.reports import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S
 from device.serial_gun.gun import speed_of
 from device.words import (
     DIRECTIONS,

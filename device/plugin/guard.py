@@ -6,33 +6,31 @@ is believed only if it fits the command and the clock, and each of its calls has
 
 from __future__ import annotations
 
-import math
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, wait
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import FrameType, MappingProxyType
 from typing import TypeVar
 
 from device.limits import DriveHistory, planned_start_s
-from device.methods import Method, Rendering, rendering_of
+from device.methods import Method, rendering_of
+from device.plugin.reports import HANDED_OVER_S, PluginOrder, broken_rule, broken_status, is_line, plain_report
 from device.words import (
     AWAKE_S,
     INTERRUPTS,
+    DeviceError,
     Gun,
     GunStatus,
     Identity,
     LimitError,
     LinkError,
-    Pulse,
     Shot,
     ShotReport,
     error_line,
-    is_finite,
-    is_whole_number,
     judged,
     said_by,
 )
@@ -40,17 +38,6 @@ from device.words import (
 ANSWER_S, DISARM_S = 5.0, 2.0
 """So long a plug-in may take for anything but a shot's own time, and to disarm; a busy machine stands still for some
 of it. Assumed."""
-HANDED_OVER_S = 0.05
-"""So long before its time a shot is handed to the plug-in; until then the guard alone waits. Assumed: a train's shots
-are asked for 30 ms ahead, so none of a run waits here."""
-CLOCK_SLACK_S = 0.001
-"""So much a plug-in's times may lie outside of what this machine's clock allows. Assumed."""
-LENGTH_SLACK_S, LENGTH_SLACK_PART = 0.0002, 0.02
-"""So much a pulse may be longer or shorter than ordered: as on the wire, where more is told as late or cut."""
-MOST_SHOTS = 10**12
-"""No gun counts so many."""
-LONGEST_READY_S = 60.0
-"""So far ahead a plug-in may put its next shot: as long as the limit of shots a minute can make one wait."""
 
 _Answer = TypeVar("_Answer")
 
@@ -143,22 +130,6 @@ def wait_awake(done: Future[_Answer], seconds: float) -> None:
         wait([done], min(left_s, AWAKE_S))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PluginOrder:
-    """One shot as it was handed over: when it was asked for, when it is due, and what the model says of it."""
-
-    shot: Shot
-    requested_s: float
-    start_s: float
-    rendering: Rendering
-
-    @property
-    def longest_s(self) -> float:
-        """How long it may be driven: a pulse's length, a vibration's duration."""
-        drive = self.shot.drive
-        return drive.pulse_s if isinstance(drive, Pulse) else self.rendering.settle_s
-
-
 class GuardedGun:
     """A plug-in's `Gun` behind the guard; `name` is what `--gun` calls it.
 
@@ -233,7 +204,7 @@ class GuardedGun:
         if self._closed:
             self._check_gone()
             return self._status(GunStatus(state="disarmed", shots=0, coil_temperature_C=0.0, ready_at_s=0.0))
-        found = self._status(_checked_status(self.name, self._ask("status", self._gun.status), self._clock()))
+        found = self._status(self._checked_status())
         if found.state in {"armed", "resetting"} and not self._armed:
             return replace(found, state="fault", fault="it says that it is armed, and it was not told so")
         return found
@@ -286,6 +257,15 @@ class GuardedGun:
         except Exception as error:
             raise PluginError(f"gun plug-in {self.name} broke off in {what}: {said_by(error)}") from error
 
+    def _read(self, look: Callable[[], _Answer]) -> _Answer:
+        """What is to be made of an object of the plug-in's, whose own code may break off."""
+        try:
+            return look()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise PluginError(f"gun plug-in {self.name} says what cannot be read ({said_by(error)})") from error
+
     def _disarm_it(self) -> None:
         """Have it disarm; one that did not answer is told again, and not waited for so long again."""
         try:
@@ -302,15 +282,24 @@ class GuardedGun:
             said = error_line(why) if isinstance(why, LinkError) else f"gun plug-in {self.name}: interrupted"
             raise GunLeftOpen(f"{said}; it was not let go of ({error_line(error)}): switch off its power") from why
 
+    def _checked_status(self) -> GunStatus:
+        """What the plug-in says of itself, if it can be."""
+        said = self._ask("status", self._gun.status)
+        broken = self._read(lambda: broken_status(said, self._clock()))
+        if broken:
+            raise PluginError(f"gun plug-in {self.name} gives as its status {broken}")
+        return said
+
     def _check_disarmed(self, when: str) -> None:
-        state = _checked_status(self.name, self._ask("status", self._gun.status), self._clock()).state
+        state = self._checked_status().state
         if state in {"armed", "resetting"} and not self._armed:
             raise PluginError(f"gun plug-in {self.name} says that it is {state} {when}")
 
     def _identity(self, said: object) -> Identity:
-        if isinstance(said, Identity) and all(map(_is_text, (said.model, said.version, said.serial))):
+        if isinstance(said, Identity) and all(map(is_line, (said.model, said.version, said.serial))):
             return said
-        raise PluginError(f"gun plug-in {self.name} identifies as {said!r}; it must be an Identity of lines of text")
+        shown = self._read(lambda: repr(said))
+        raise PluginError(f"gun plug-in {self.name} identifies as {shown}; it must be an Identity of lines of text")
 
     # a shot
 
@@ -337,9 +326,7 @@ class GuardedGun:
         seconds = max(0.0, order.start_s - self._clock()) + order.longest_s + ANSWER_S
         try:
             report = self._ask("fire", lambda: self._gun.fire(order.shot, at_s), seconds)
-            broken = broken_rule(order, report, self._clock())
-            if broken:
-                raise PluginError(f"gun plug-in {self.name}: {broken}; the shot does not count")
+            report = self._read(lambda: self._believed(order, report))
         except LimitError:
             raise
         except BaseException:  # an interrupt too
@@ -349,6 +336,12 @@ class GuardedGun:
         self._spend(order, report.pulse_start_s)
         home_s = max(report.home_predicted_s, report.pulse_start_s + order.rendering.settle_s)
         return replace(report, requested_s=order.requested_s, home_predicted_s=home_s)
+
+    def _believed(self, order: PluginOrder, report: object) -> ShotReport:
+        broken = broken_rule(order, report, self._clock())
+        if broken or not isinstance(report, ShotReport):
+            raise PluginError(f"gun plug-in {self.name}: {broken}; the shot does not count")
+        return plain_report(report)
 
     def _spend(self, order: PluginOrder, start_s: float) -> None:
         load = order.rendering.load
@@ -370,62 +363,3 @@ class GuardedGun:
         with self._told:
             if not self._armed or self._disarms != disarms:
                 raise LimitError("the gun is disarmed; arm it before it may fire")
-
-
-def broken_rule(order: PluginOrder, report: object, now_s: float) -> str:
-    """The first rule that a plug-in's report breaks, with its values; empty if there is none."""
-    if not isinstance(report, ShotReport):
-        return f"fire gave back {report!r}; it must be a ShotReport"
-    if report.shot != order.shot:
-        return f"it reports {report.shot}; ordered was {order.shot}"
-    times = (report.pulse_start_s, report.pulse_end_s, report.home_predicted_s)
-    if not all(map(is_finite, times)):
-        return f"its times are {', '.join(map(repr, times))}; they must be finite seconds of the host's clock"
-    early_s, late_s = order.start_s - CLOCK_SLACK_S, max(order.start_s, now_s) + HANDED_OVER_S
-    if not early_s <= report.pulse_start_s <= late_s:
-        return (
-            f"it reports an onset at {report.pulse_start_s:.6f} s; it must lie between {early_s:.6f} s, when the shot "
-            f"was due, and {late_s:.6f} s, when it was reported"
-        )
-    return _broken_length(order, report)
-
-
-def _broken_length(order: PluginOrder, report: ShotReport) -> str:
-    length_s, longest_s = report.pulse_end_s - report.pulse_start_s, order.longest_s
-    slack_s = max(LENGTH_SLACK_S, LENGTH_SLACK_PART * longest_s)
-    shortest_s = longest_s if isinstance(order.shot.drive, Pulse) else 0.0
-    if not shortest_s - slack_s <= length_s <= longest_s + slack_s:
-        return f"it reports a drive of {length_s:.6f} s; ordered was {longest_s:.6f} s"
-    if report.home_predicted_s < report.pulse_end_s:
-        return f"it is home at {report.home_predicted_s:.6f} s, before its drive ends at {report.pulse_end_s:.6f} s"
-    if not _is_text(report.motion):
-        return f"its motion is {report.motion!r}; it must be a line of text"
-    return ""
-
-
-def _is_text(value: object) -> bool:
-    """Whether it is a line of text, which can be shown and written down."""
-    return isinstance(value, str) and value != "" and value.isprintable()
-
-
-_STATES = ("disarmed", "armed", "resetting", "fault")
-
-
-def _checked_status(name: str, said: object, now_s: float) -> GunStatus:
-    """What a plug-in says of itself, if it can be. `PluginError` names the field."""
-    broken = ""
-    if not isinstance(said, GunStatus):
-        broken = f"{said!r}; it must be a GunStatus"
-    elif said.state not in _STATES:
-        broken = f"state {said.state!r}; it must be one of {', '.join(_STATES)}"
-    elif not (is_whole_number(said.shots) and 0 <= said.shots < MOST_SHOTS):
-        broken = f"shots {said.shots!s:.20}; it must be a whole number of at least 0"
-    elif not (said.fault is None or (_is_text(said.fault) and said.state == "fault")):
-        broken = f"fault {said.fault!r} in state {said.state}; it must be None, or a line of text in state fault"
-    elif not is_finite(said.coil_temperature_C):
-        broken = f"coil_temperature_C {said.coil_temperature_C!r}; it must be finite"
-    elif not (said.ready_at_s == -math.inf or is_finite(said.ready_at_s)) or said.ready_at_s > now_s + LONGEST_READY_S:
-        broken = f"ready_at_s {said.ready_at_s!r}; it must be at most {LONGEST_READY_S:g} s ahead of {now_s:.3f}"
-    if broken or not isinstance(said, GunStatus):
-        raise PluginError(f"gun plug-in {name} gives as its status {broken}")
-    return said

@@ -74,6 +74,16 @@ class SerialGun:
         `LinkError` says whether the shot was fired, was not, or may have been: what the gun says of it is believed only
         if it contradicts neither its order nor the clocks (`checks`). It is never fired later.
         """
+        try:
+            return self._ordered(shot, at_s)
+        except Unsure:
+            raise
+        except LinkError as error:
+            error.may_have_fired = False
+            raise
+
+    def _ordered(self, shot: Shot, at_s: float | None) -> ShotReport:
+        """The same, of which each error but `Unsure` says that nothing was fired."""
         disarms = self.arming.disarms
         self._is_open()
         with self.turn:
@@ -113,6 +123,11 @@ class SerialGun:
         (ready,) = self.link.host(said.ready_us)
         next_s = max(self.history.ready_s, ready_s(said, reply, ready))
         return self._status(_STATES[said.state], said.count, said.coil_mC / 1000, next_s, self._fault(said))
+
+    @property
+    def clock_jumps(self) -> int:
+        """How often the gun's clock contradicted what was known of it: always, where its speed is another one."""
+        return self.link.clock_jumps
 
     def close(self) -> None:
         """Disarm, and let go of the line."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -55,6 +56,10 @@ class CutShort(LinkError):  # noqa: N818
 
 class WrongVersion(LinkError):  # noqa: N818
     """A gun that speaks another version of the wire."""
+
+
+class AnotherGun(LinkError):  # noqa: N818
+    """A gun with another serial number than the one that was there."""
 
 
 class CommandRefused(LinkError):  # noqa: N818
@@ -169,6 +174,8 @@ class Clocks:
         self._landmarks: deque[Exchange] = deque(maxlen=LANDMARKS)
         self._rate = (1 - MAX_DRIFT, 1 + MAX_DRIFT)
         self._count = 0
+        self.jumps = 0
+        """How often an exchange contradicted those before."""
 
     @property
     def known(self) -> bool:
@@ -178,6 +185,7 @@ class Clocks:
     def add(self, exchange: Exchange) -> None:
         """Learn from an exchange. One that contradicts those before takes their place: a clock was set."""
         if not self._fits(exchange):
+            self.jumps += 1
             self._forget()
         self._recent.append(exchange)
         self._count += 1
@@ -278,7 +286,7 @@ class SerialPort:
                 exclusive=True if os.name == "posix" else None,
             )
             self._port.reset_input_buffer()
-        except _BROKEN as error:
+        except (*_BROKEN, re.error) as error:  # the last: a pattern of hwgrep:// that is none
             raise LinkError(f"cannot open {address}: {_reason(error)}") from error
         self._late = serial.SerialTimeoutException
 

@@ -81,6 +81,11 @@ class Link:
                 raise trouble
 
     @property
+    def clock_jumps(self) -> int:
+        """How often the gun's clock contradicted what was known of it, in this session."""
+        return self._clocks.jumps
+
+    @property
     def silent_for_s(self) -> float:
         """How long nothing was written, in seconds of the real world."""
         return time.monotonic() - self.written_s
@@ -188,7 +193,7 @@ class Link:
         return ended.alone if isinstance(ended, lines.Forgotten) else f"the line was lost ({ended})"
 
     def _introduce(self, port: lines.Port) -> None:
-        """See who is there, in the plain language that every version speaks; a wrong version must say so twice."""
+        """See who is there, in the plain language that every version speaks; who is wrong there must say so twice."""
         said = list[bytes]()
         for _ in range(GREETING_TRIES):
             self._plain = b""
@@ -198,7 +203,7 @@ class Link:
                 self._pump()
             try:
                 self._check(Named.parse(self._plain.decode("latin-1")))
-            except (Garbled, lines.WrongVersion):
+            except (Garbled, lines.WrongVersion, lines.AnotherGun):
                 said.append(self._plain)
                 if len(said) > 1 and said[-1] == said[-2] != b"":
                     raise
@@ -213,7 +218,7 @@ class Link:
                 f"this Recoil version {WIRE_VERSION}; flash the firmware of this Recoil (device/firmware)"
             )
         if self.named is not None and named.serial != self.named.serial:
-            raise LinkError(f"another gun is there now: {named.serial}, not {self.named.serial}")
+            raise lines.AnotherGun(f"another gun is there now: {named.serial}, not {self.named.serial}")
 
     def _greet(self, body: str) -> lines.Reply:
         """Ask from the thread that reads. What is asked here may be asked again."""

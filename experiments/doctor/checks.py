@@ -10,7 +10,7 @@ import platform
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from device import DeviceError, Gun, open_gun
+from device.methods import Method
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
@@ -148,7 +149,8 @@ def gun_line(opened: Callable[[], Gun]) -> GunLine:
         gun.disarm()
         times = timed_ms(ROUND_TRIPS, gun.status)
         status = gun.status()
-    return GunLine(gun=name, state=status.state, fault=status.fault, round_trip_ms=spread(times))
+        jumps: int = getattr(gun, "clock_jumps", 0)
+    return GunLine(gun=name, state=status.state, fault=status.fault, round_trip_ms=spread(times), clock_jumps=jumps)
 
 
 def adapters(folder: Path = ADAPTERS) -> list[Adapter]:
@@ -200,21 +202,22 @@ def checks(
     *,
     shots: int = 0,
     sensor: str = "",
-    damped: GunParameters | None = None,
+    methods: Mapping[str, Method] | None = None,
     asked: LanguageAsked | None = None,
 ) -> tuple[Check, ...]:
     """What there is to look at, for a results folder and a gun's address; `limit_s` is its line's, there and back.
 
-    With `shots` the gun is fired, in so many trials: nobody is to hold it. Of a `sensor` it is looked at how soon it
-    would see a change of the friction of the method that is damped most.
+    With `shots` the gun is fired by each of its `methods` (the paper's, unless they are given), in so many trials:
+    nobody is to hold it. Of a `sensor` it is looked at how soon it would see a change of the friction of the method
+    that is damped most.
     """
     looks: dict[str, Callable[[], tuple[DoctorFinding, ...]]] = {
         "machine": lambda: (verdicts.of_machine(machine()),),
         "clock": lambda: (verdicts.of_clock(ticks()),),
         "disk": partial(_disk, results),
-        "gun": partial(_gun, gun, limit_s),
-        **({"shots": partial(_shots, gun, shots)} if shots else {}),
-        **({"sensor": partial(_sensor, sensor, gun, damped)} if sensor else {}),
+        "gun": partial(_gun, gun, limit_s, methods),
+        **({"shots": partial(_shots, gun, shots, methods)} if shots else {}),
+        **({"sensor": partial(_sensor, sensor, gun, methods)} if sensor else {}),
         "USB adapter": lambda: (verdicts.of_adapters(adapters()),),
         "display": partial(_on_display, "display", "display"),
         "PsychoPy": partial(_on_display, "PsychoPy", "stage", PSYCHOPY_DEADLINE_S),
@@ -255,10 +258,10 @@ def _disk(results: Path) -> tuple[DoctorFinding, ...]:
         return (verdicts.of_disk_failure(str(results), error.strerror or str(error)),)
 
 
-def _gun(address: str, limit_s: float) -> tuple[DoctorFinding, ...]:
+def _gun(address: str, limit_s: float, methods: Mapping[str, Method] | None) -> tuple[DoctorFinding, ...]:
     ours = address == "simulated" or address.startswith(SCHEME)
     seconds = DEADLINE_S if ours else DEADLINE_S + IMPORT_S + PLUGIN_OPEN_S
-    guns = OpenedGuns(lambda: open_gun(address, clock=RealClock(speed_of(address) or 1.0).now))
+    guns = OpenedGuns(lambda: open_gun(address, methods, clock=RealClock(speed_of(address) or 1.0).now))
     try:
         return (verdicts.of_link(_tried(address, seconds, guns, partial(gun_line, guns.open)), limit_s),)
     except PluginError as error:
@@ -271,10 +274,10 @@ SHOT_S = 1.0
 """A trial takes no longer, and the other checks of the kit no longer than twenty."""
 
 
-def _shots(address: str, trials: int) -> tuple[DoctorFinding, ...]:
+def _shots(address: str, trials: int, methods: Mapping[str, Method] | None) -> tuple[DoctorFinding, ...]:
     """What every gun keeps, tried on this one."""
     try:
-        rig = rig_at(address, trials=trials)
+        rig = rig_at(address, methods, trials)
     except ValueError as error:
         raise PlaceError(f"--gun {address}: {error}") from error
     guns, found = OpenedGuns(rig.open_gun), list[ConformanceFinding]()
@@ -312,7 +315,7 @@ def _tried(address: str, seconds: float, guns: OpenedGuns, work: Callable[[], _R
     return result
 
 
-def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[DoctorFinding, ...]:
+def _sensor(address: str, gun: str, methods: Mapping[str, Method] | None) -> tuple[DoctorFinding, ...]:
     """A sensor at rest; of the simulated one, what it says of itself. `DeviceError`: it is refused."""
     from device.physics.hand import HandMechanics  # noqa: PLC0415 - as below
     from device.sensor import link, simulated, turn  # noqa: PLC0415 - what few rigs have, and slow to import
@@ -324,6 +327,8 @@ def _sensor(address: str, gun: str, damped: GunParameters | None) -> tuple[Docto
         with closing(link.SensorLink(address)) as sensor:
             ready = sensor.ready
     seen = None
+    coils = (one for one in (methods or {}).values() if isinstance(one, GunParameters))
+    damped = max(coils, key=lambda one: one.friction_N, default=None)
     if damped is not None and damped.friction_N > 0:
         masses = HandMechanics().enclosure_mass_kg, damped.magnet_mass_kg
         seen = shots_to_see(turn.friction_uncertainty_N(ready.noise_m_s2, ready.rate_Hz, *masses) / damped.friction_N)

@@ -80,6 +80,7 @@ class GunLine:
     state: str
     fault: str | None
     round_trip_ms: Percentiles
+    clock_jumps: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

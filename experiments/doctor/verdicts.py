@@ -164,9 +164,20 @@ def of_disk_failure(folder: str, reason: str) -> figures.DoctorFinding:
     return figures.DoctorFinding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
 
 
+MOST_JUMPS = 2
+"""A gun that is switched on anew does so; one of another speed at every word."""
+
+
 def of_link(found: figures.GunLine, limit_s: float) -> figures.DoctorFinding:
     """The gun and the way to it, whose 95th percentile is to keep a limit."""
     measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
+    if found.clock_jumps > MOST_JUMPS:
+        measured += f"; its clock contradicted this machine's {found.clock_jumps} times"
+        advice = (
+            "its clock does not go as the address says, so no shot's time would be believed: leave ?speed out, unless "
+            "a twin in a hurry answers there, and then give its speed"
+        )
+        return figures.DoctorFinding(check="gun", verdict="fails", measured=measured, advice=advice, figures=found)
     if found.fault is not None or found.state != "disarmed":
         advice = "switch off the gun's power, remove the cause, and look again before anybody holds it"
         measured += "" if found.fault is None else f"; fault: {found.fault}"
@@ -187,6 +198,9 @@ def of_link_failure(reason: str) -> figures.DoctorFinding:
 def of_conformance(found: Sequence[ConformanceFinding]) -> figures.DoctorFinding:
     """Whether the gun keeps what every gun keeps, by `device.plugin.conformance`."""
     measured = "; ".join(f"{one.check}: {one.said}" for one in found if not one.kept)
+    if [one.check for one in found] == ["opening"]:
+        advice = "the gun did not open, so nothing was tried: close what else has it open, and see to what “gun” says"
+        return figures.DoctorFinding(check="shots", verdict="fails", measured=found[0].said, advice=advice)
     advice = "nobody may hold this gun: it does not keep what every gun keeps; mend it, or the plug-in that brings it"
     if measured:
         return figures.DoctorFinding(check="shots", verdict="fails", measured=measured, advice=advice)
