@@ -14,7 +14,7 @@ from device import LimitError
 from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
 from device.methods import drive_of, rendering_of
 from device.parameters import GunParameters
-from device.words import Drive
+from device.words import Drive, escaped
 from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, why_unread
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
@@ -46,7 +46,7 @@ def find(name: str | Path) -> Path:
     known = ", ".join(sorted(path.stem for path in shipped_folder().glob("*.toml")))
     if name and Path(name).is_dir():
         raise ConfigError(f"{name}: a folder, not a config; name a file in it, or a shipped config: {known}")
-    raise ConfigError(f"{name}: no such file and no shipped config; shipped are {known}")
+    raise ConfigError(f"{escaped(name)}: no such file and no shipped config; shipped are {known}")
 
 
 def load_setup(name: str | Path) -> Setup[DesignConfig]:

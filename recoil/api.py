@@ -55,8 +55,7 @@ def plan(setup: Setup[DesignConfig], participant: str = "P01", seed: int = 1, or
     if not isinstance(participant, str):
         raise argument_error("participant", participant, "a code, such as 'P01'")
     check_code(participant)
-    checked_seed(seed)
-    return plan_of(setup.config, participant, seed, row=order_row)
+    return plan_of(setup.config, participant, checked_seed(seed), row=order_row)
 
 
 def run_synthetic(

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 
-from device.words import RecoilError
+from device.words import RecoilError, is_number, is_whole_number
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.load import find
@@ -104,16 +104,16 @@ def numbers_of(name: str, values: object) -> str | None:
 
 def count_of(name: str, value: object, most: int) -> int:
     """A whole number from 1."""
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+    if not is_whole_number(value) or not 1 <= value <= most:
         raise argument_error(name, value, f"a whole number from 1 to {most:,}")
-    return value
+    return int(value)
 
 
 def share_argument(name: str, value: object) -> float:
     """A number between 0 and 1."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1:
+    if not is_number(value) or not 0 < value < 1:
         raise argument_error(name, value, "a number between 0 and 1, such as 0.8")
-    return value
+    return float(value)
 
 
 def in_python(message: str) -> str:

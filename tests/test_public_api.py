@@ -194,3 +194,15 @@ def test_the_statistics_of_any_design_are_a_frame_and_a_table_in_a_notebook(tmp_
     assert cell["mean"].item() == pytest.approx(mine.mean())
     assert (len(frame), cell["n"].item()) == (12, 3)
     assert "Realism, comfort, voltage_V: F(2, 4) = " in found._repr_html_()
+
+
+def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
+    setup = recoil.load_config("direction")
+    assert recoil.plan(setup, "P01", seed=np.int64(3)) == recoil.plan(setup, "P01", seed=3)
+    with pytest.raises(recoil.RecoilError, match=r"seed = 3\.0: must be a whole number"):
+        recoil.plan(setup, "P01", seed=3.0)  # type: ignore[arg-type]
+
+
+def test_a_name_that_breaks_the_line_is_shown_on_one() -> None:
+    with pytest.raises(recoil.RecoilError, match=r"name = a\\nb: no such file"):
+        recoil.load_config("a\nb")

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from statistics import NormalDist
 from typing import TYPE_CHECKING, TypeVar
 
+from device.words import is_whole_number
 from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json
 from experiments.design.bits import Pcg64
@@ -32,9 +33,9 @@ def draw_seed() -> int:
 
 def checked_seed(seed: object) -> int:
     """The seed, if it is one. `ConfigError`: anything else than a whole number that a config may hold."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= MAX_SEED:
+    if not is_whole_number(seed) or not 0 <= seed <= MAX_SEED:
         raise ConfigError(f"seed = {seed!r}: must be a whole number from 0 to {MAX_SEED}, such as 1")
-    return seed
+    return int(seed)
 
 
 class Stream:
