@@ -371,7 +371,7 @@ class DeskGun:
             pulse_start_s=now_s,
             pulse_end_s=now_s,
             home_predicted_s=now_s,
-            motion=steps.NO_SHOT,
+            motion=steps.NO_MOTION,
         )
 
     def present(self, step: steps.Present) -> steps.Presented | steps.Failed | steps.Interrupted:

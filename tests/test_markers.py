@@ -162,7 +162,8 @@ def test_what_is_in_the_way_is_said_once_and_the_run_goes_on(  # noqa: PLR0917
         variables["LSLAPICFG"] = str(tmp_path / "deaf.cfg")
     done = recoil(*words(quick_configs, "--screen", "synthetic", "--gun", "simulated", "--lsl"), **variables)
     assert done.returncode == 0
-    (line,) = [line for line in done.stderr.splitlines() if "clock of its own" not in line]
+    apart = ("clock of its own", "the run waits for the streams")  # the second on a slow machine
+    (line,) = [line for line in done.stderr.splitlines() if not any(words in line for words in apart)]
     assert said in line
     assert read_journal(tmp_path / "results" / "sub-P01" / NAME).finished
 

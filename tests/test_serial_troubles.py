@@ -355,6 +355,7 @@ def test_a_serial_number_that_is_misread_once_is_not_another_gun(tmp_path):
         link = Link(lambda: socket.address, time.monotonic, open_port=Misread)
         link.start(PATIENCE_S)
         link.drop("the test says so")
-        wait_for(lambda: Misread.opened > 1 and link._up.is_set())
+        wait_for(lambda: Misread.opened > 1)
+        link.wait_up(PATIENCE_S)
         assert link.named.serial == "TWIN-1"
         link.close()

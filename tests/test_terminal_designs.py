@@ -16,7 +16,7 @@ from experiments.record.replay import history, outcomes
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
-from experiments.session.steps import NO_SHOT, Fired
+from experiments.session.steps import NO_MOTION, Fired
 from tests.at_terminal import DAMPER, AtTerminal
 from tests.warm_start import warm
 
@@ -178,7 +178,8 @@ def test_a_row_of_two_intervals_has_the_onset_of_the_first_and_what_became_of_th
     assert [row["onset_utc"] for row in felt] == [word.onset_utc for _, word in fired[::2]]
     assert {row["status"] for row in felt} <= {"home", "no-break-away"}
     shot = [
-        next(word.motion for _, word in fired[at : at + 2] if word.motion != NO_SHOT) for at in range(0, len(fired), 2)
+        next(word.motion for _, word in fired[at : at + 2] if word.motion != NO_MOTION)
+        for at in range(0, len(fired), 2)
     ]
     assert [row["status"] for row in felt] == shot
 

@@ -187,9 +187,8 @@ def long_name(name: str) -> str:
 def readme(people: int, synthetic: int, *, free_text: bool) -> str:
     """The page of a data set: who is in it, how to read it, what is left out, what to add."""
     simulated = f", {synthetic} of them synthetic: simulations, not people" if synthetic else ""
-    return _README.format(
-        people=how_many(people, "participant"), synthetic=simulated, text=_LEFT_IN if free_text else _LEFT_OUT
-    )
+    text = _LEFT_IN if free_text else _LEFT_OUT
+    return _README.format(people=how_many(people, "participant"), synthetic=simulated, text=text)
 
 
 BIDS_VERSION = "1.11.1"
@@ -387,8 +386,8 @@ def _event_table(run: Run, shown: Sequence[Column]) -> bytes:
 
 def _first_pulse(run: Run) -> tuple[datetime | None, bool]:
     """The earliest pulse in a run's rows, and whether its clock was set back."""
-    back = any(tables.CLOCK_SET_BACK in str(row["flags"] or "").split() for row in run.rows)
     moments = (as_moment(str(row["onset_utc"] or "")) for row in run.rows)
+    back = any(tables.CLOCK_SET_BACK in str(row["flags"] or "").split() for row in run.rows)
     return min(filter(None, moments), default=None), back
 
 
@@ -435,10 +434,9 @@ def _onsets(run: Run) -> list[float | None]:
 def _cell(column: Column, value: Cell) -> str:
     if value is None:
         return NOT_AVAILABLE
-    if isinstance(value, float) and column.type in ("integer", "flag"):
-        return str(int(value))  # whole numbers beside empty cells
     if isinstance(value, float):
-        return repr(float(value))
+        whole = column.type in ("integer", "flag")  # beside empty cells they are floats
+        return str(int(value)) if whole else repr(float(value))
     text = one_line(str(value))
     return tables.guard(text) or NOT_AVAILABLE
 

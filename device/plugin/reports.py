@@ -26,7 +26,7 @@ LONGEST_READY_S = 60.0
 """So far ahead a plug-in may put its next shot: as long as the limit of shots a minute can make one wait."""
 MOST_UNCERTAIN_S = 1.0
 """A time that is not known any better is none."""
-LONGEST_LINE = 200
+_LONGEST_LINE = 200
 """A line of text that a plug-in says has no more characters."""
 
 
@@ -120,7 +120,7 @@ def _plain_timing(timing: ShotTiming) -> ShotTiming:
 
 def is_line(value: object) -> bool:
     """Whether it is a line of text, which can be shown and written down."""
-    return isinstance(value, str) and 0 < len(value) <= LONGEST_LINE and value.isprintable()
+    return isinstance(value, str) and 0 < len(value) <= _LONGEST_LINE and value.isprintable()
 
 
 _STATES = ("disarmed", "armed", "resetting", "fault")

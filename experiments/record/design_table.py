@@ -15,7 +15,7 @@ from experiments.record.tables import Row
 from experiments.session import remarks
 from experiments.session.history import History, TrialHistory, by_trial, is_attempt
 from experiments.session.remarks import EntryCorrected
-from experiments.session.steps import NO_SHOT, Answered, Failed, Fired, Interrupted, Presented
+from experiments.session.steps import NO_MOTION, Answered, Failed, Fired, Interrupted, Presented
 from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import correct_columns, is_right
 
@@ -63,16 +63,16 @@ def _row(plan: Plan, design: DesignConfig, planned: Trial, events: TrialHistory)
     }
 
 
-Moment = TypeVar("Moment", str, datetime)
+_Moment = TypeVar("_Moment", str, datetime)
 
 
-def went_back(rows: Iterable[Mapping[str, object]], moment: Callable[[str], Moment | None]) -> Iterator[int]:
+def went_back(rows: Iterable[Mapping[str, object]], moment: Callable[[str], _Moment | None]) -> Iterator[int]:
     """Where the stimulus has an earlier date and time than the last one before: the clock was set back.
 
     Of adaptive tracks the last one before in the track, as one that goes on after a correction comes late in its set. A
     trial that was repeated may come later than those behind it, so that these are not compared with it.
     """
-    before: dict[object, Moment] = {}
+    before: dict[object, _Moment] = {}
     for place, row in enumerate(rows):
         onset, track = moment(str(row.get("onset_utc") or "")), row.get("track")
         if onset is None:
@@ -165,7 +165,7 @@ def _is_corrected(entered: list[Answered | EntryCorrected]) -> bool:
 
 def _motions(events: TrialHistory) -> str:
     """What the model says of each shot of the last presentation; an empty interval has none."""
-    return " ".join(one.motion for one in events.stimulus if isinstance(one, Fired) and one.motion != NO_SHOT)
+    return " ".join(one.motion for one in events.stimulus if isinstance(one, Fired) and one.motion != NO_MOTION)
 
 
 def _shown(events: TrialHistory) -> Row:

@@ -160,7 +160,7 @@ class Prepared:
     kind: Literal["prepared"] = "prepared"
 
 
-NO_SHOT = "none"
+NO_MOTION = "none"
 """The motion in an interval, or a catch trial, in which nothing is fired."""
 
 
