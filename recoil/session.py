@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -281,6 +282,16 @@ def _holds(path: Path, data: bytes) -> bool:
         return False
 
 
+def _kept(table: Path, data: bytes, messages: list[str]) -> bool:
+    """Whether a table has this content already; else it has now, and what stood there is set aside with a message."""
+    if _holds(table, data):
+        return True
+    if os.path.lexists(table):
+        messages.append(f"{table}: differed from its journal and was set aside as {storage.set_aside_file(table)}")
+    storage.write_whole(table, data)
+    return False
+
+
 def rebuild_table(path: Path) -> RebuiltTable:
     """The table of a journal, and that of what a sensor measured.
 
@@ -288,12 +299,8 @@ def rebuild_table(path: Path) -> RebuiltTable:
     """
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
-    same = _holds(table, data)
-    if not same and (table.exists() or table.is_symlink()):
-        messages.append(f"{table}: differed from its journal and was set aside as {storage.set_aside_file(table)}")
-    if not same:
-        storage.write_whole(table, data)
+    kept = _kept(table, data, messages)
     measured = shots_table(contents)
     if measured is not None:
-        storage.write_whole(path.with_name(path.name.replace("_journal", "_shots")).with_suffix(".csv"), measured)
-    return RebuiltTable(table=table, rebuilt=not same, messages=tuple(messages))
+        _kept(path.with_name(path.name.replace("_journal", "_shots")).with_suffix(".csv"), measured, messages)
+    return RebuiltTable(table=table, rebuilt=not kept, messages=tuple(messages))

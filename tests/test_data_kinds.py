@@ -12,6 +12,7 @@ import pytest
 import recoil as public
 from analysis.logs.reading import read_logs
 from analysis.stats.anova import rm_anova
+from analysis.summary.analyze import Request, result_files
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
@@ -265,3 +266,14 @@ def test_a_synthetic_practice_is_nobodys(pilot: Path) -> None:
 def test_a_run_without_a_code_says_what_to_add(recoil: Recoil, tmp_path: Path) -> None:
     refused(recoil("run", "direction", "--screen", "synthetic"), "--participant S01")
     assert not (tmp_path / "results").exists()
+
+
+def test_an_entry_of_the_rules_that_means_somebody_in_data_of_one_kind_is_not_called_idle(
+    mixed: Path, tmp_path: Path
+) -> None:
+    listed = [(code, f'[[excluded]]\ncode = "{code}"\nreason = "a try"\n') for code in ("P02", "P77")]
+    (tmp_path / "rules.toml").write_text("".join(text for _, text in listed), encoding="utf-8")
+    request = Request(paths=(mixed,), out=tmp_path / "out", rules=tmp_path / "rules.toml", include_synthetic=True)
+    found = json.loads(result_files(request)["statistics.json"])
+    assert [one for one in found["warnings"] if "no log here" in one] == ["the rules exclude P77, who has no log here"]
+    assert "P02" in [one["participant"] for one in found["kept_apart"]["synthetic"]["excluded"]]

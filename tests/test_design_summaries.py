@@ -14,6 +14,7 @@ from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.diagnostics import sphericity
 from analysis.summary.assumptions import not_spherical
 from analysis.summary.designs import summarise
+from analysis.summary.results import StudyStatistics
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
@@ -229,3 +230,17 @@ def test_a_test_whose_own_p_misleads_is_named_in_a_warning():
         "realism, realism, voltage_V: sphericity does not hold (Greenhouse-Geisser epsilon 0.55, below 0.75): read the "
         "corrected p = 0.07; Tukey's test of pairs takes sphericity too"
     ]
+
+
+def test_factors_that_are_called_like_a_column_of_the_frame_stay_apart():
+    _, found = of("realism")
+    cells = [
+        replace(cell, levels={"n": cell.levels["damper"], "question": cell.levels["voltage_V"]})
+        for cell in found.questions["realism"].cells
+    ]
+    odd = replace(found, questions={"realism": replace(found.questions["realism"], cells=tuple(cells))})
+    frame = StudyStatistics(designs={"odd": odd}).to_frame()
+    assert set(frame["question"]) == {"realism"}
+    assert set(frame["n"]) == {24}
+    assert len(frame[["factor_n", "factor_question"]].drop_duplicates()) == 6
+    assert frame["ci_low"].dtype == float

@@ -9,6 +9,7 @@ import pytest
 
 import recoil
 from analysis.logs.exclusion_rules import ExclusionEffect, KeptTrials, Rules, apply_rules
+from analysis.logs.exclusions import by_study
 from analysis.logs.reading import Logs, read_logs
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
@@ -177,3 +178,45 @@ def test_who_says_the_same_to_every_trial_of_a_design_is_left_out_where_the_rule
     alone = _rules(tmp_path, "[participants]\nmax_same_response_share = 0.9\n")
     effect = apply_rules(replace(logs, designs=(replace(one, table=same),)), alone)
     assert [(gone.participant, gone.rule) for gone in effect.excluded] == [("P02", "max_same_response_share")]
+
+
+@pytest.mark.parametrize("name", ["pairs", "staircase", "stronger"])
+def test_rules_that_leave_nobody_leave_a_report_of_nobody(name: str, tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config(name), ["P01", "P02"], tmp_path / "results", seed=1)
+    everybody = "".join(f'[[excluded]]\ncode = "{code}"\nreason = "left-handed"\n' for code in ("P01", "P02"))
+    effect = apply_rules(read_logs([tmp_path / "results"]), _rules(tmp_path, everybody))
+    found = summarize(effect.logs)
+    assert found.designs[name].n == 0
+    assert [one.participant for one in effect.excluded] == ["P01", "P02"]
+
+
+def test_what_was_planned_is_what_a_share_of_trials_kept_is_of(tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config("realism"), ["P01", "P02"], tmp_path / "results", seed=1)
+    logs = read_logs([tmp_path / "results"])
+    (one,) = logs.designs
+    table = one.table.astype(object)
+    stopped = (table["participant_id"] == "P02") & (table["trial"] > 3)  # a run that was stopped: never presented
+    table.loc[stopped, ["realism", "comfort", "attempts", "onset_utc"]] = None
+    rules = _rules(tmp_path, "[trials]\ndrop_unanswered = true\n[participants]\nmin_kept_share = 0.8\n")
+    effect = apply_rules(replace(logs, designs=(replace(one, table=table),)), rules)
+    assert [(gone.participant, gone.rule) for gone in effect.excluded] == [("P02", "min_kept_share")]
+
+
+def test_trials_after_the_end_of_a_track_are_no_trials_to_rules(tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config("staircase"), ["P01"], tmp_path / "results", seed=3)
+    logs = read_logs([tmp_path / "results"])
+    table = logs.designs[0].table
+    presented = int(table["attempts"].notna().sum())
+    assert presented < len(table)
+    rules = _rules(tmp_path, "[trials]\ndrop_unanswered = true\n[participants]\nmin_kept_share = 1.0\n")
+    effect = apply_rules(logs, rules)
+    assert effect.trials["staircase"] == KeptTrials(recorded=presented, kept=presented)
+    assert (effect.excluded, len(effect.logs.designs[0].table)) == ((), len(table))
+
+
+def test_each_study_has_its_own_people_in_the_statistics_of_designs_too(tmp_path: Path) -> None:
+    for study, codes in (("a", ["P01", "P02", "P03"]), ("b", ["P01", "P02"])):
+        recoil.run_synthetic(recoil.load_config("grip"), codes, tmp_path / study, seed=1)
+    found = by_study(read_logs([tmp_path / "a", tmp_path / "b"]))
+    people = {name: sorted(set(alone.designs[0].table["participant_id"])) for name, alone in found.items()}
+    assert people == {"a": ["P01", "P02", "P03"], "b": ["P01", "P02"]}

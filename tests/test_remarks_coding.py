@@ -158,3 +158,18 @@ def test_the_example_counts_what_was_said_to_any_question_in_words(tmp_path: Pat
     assert found["remarks"] == (table["comment"].fillna("") != "").sum() > 0
     real = next(one for one in found["codes"] if one["code"] == "real")
     assert set(said["participant_id"]) <= set(real["participants"])
+
+
+def test_only_who_is_analysed_is_counted_and_coded(tmp_path: Path) -> None:
+    write_study(tmp_path / "logs", participants=4, seed=1)
+    ratings = next((tmp_path / "logs").rglob("*P02*_ratings.csv"))
+    lines = ratings.read_text(encoding="utf-8").splitlines()
+    cells = lines[1].split(",")
+    cells[lines[0].split(",").index("rating")] = ""
+    ratings.write_text("\n".join([lines[0], ",".join(cells), *lines[2:]]) + "\n", encoding="utf-8")
+    example = shipped_folder() / "examples" / "codes.toml"
+    found = json.loads(
+        result_files(Request(paths=(tmp_path / "logs",), out=tmp_path / "out", codebook=example))["statistics.json"]
+    )
+    assert "P02" in [one["participant"] for one in found["excluded"]]
+    assert found["remarks"]["n"] == found["preference"]["n"] == 3

@@ -209,3 +209,43 @@ def test_words_are_corrected_and_left_as_the_screen_says(sitting: Sit, tmp_path:
     says(screen, "/undo", "", "", "2", "", "")
     assert screen.end() == 0
     assert [(row["size"], row["words"]) for row in rows(tmp_path)] == [("1234567.89", "a thump"), ("2.0", "")]
+
+
+def test_a_correction_after_an_emergency_stop_leaves_the_run_halted_until_it_is_closed(sitting: Sit) -> None:
+    screen = sitting(_WAY)
+    first = "f" if "FORWARD" in screen.prompt(0) else "b"
+    says(screen, "", first)
+    assert told(screen) == (1, 0)
+    says(screen, "!", "/undo", "b" if first == "f" else "f")
+    screen.wait_for("EMERGENCY STOP.", 2)  # it stands there again: nothing was told anew, and nothing closed
+    assert sum(told(screen)) == 1
+    assert screen.process.poll() is None
+    says(screen, "the hand slipped", "")
+    assert screen.end() == 130
+
+
+def test_the_trial_at_hand_is_the_one_to_be_repeated_between_its_shots(sitting: Sit, tmp_path: Path) -> None:
+    pairs = """
+[factors.method]
+levels = ["asymmetric-1", "asymmetric-2"]
+[trial]
+kind = "pair"
+compare = "method"
+[questions.rather]
+kind = "choice"
+text = "Which one?"
+answers = ["first", "second"]
+[order]
+repetitions = 2
+"""
+    screen = sitting(pairs)
+    after, fired = 0, 0
+    while "Which one?" not in (asked := screen.prompt(after)):
+        after = len(screen.seen)
+        if " for shot 2 of 2" in asked and fired == 1:
+            screen.type("repeat the first one slipped")
+            fired = 2
+            continue
+        fired += "Enter fires" in asked and fired == 0
+        screen.type("d" if DAMPER in asked else "")
+    assert "Trial 1 is presented again (the first one slipped)" in screen.seen

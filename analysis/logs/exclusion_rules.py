@@ -42,6 +42,7 @@ from analysis.stats.arrays import BoolArray
 from analysis.times.own_trials import timed
 from experiments.config.door import Model, Seconds, Share
 from experiments.design.language import METHOD_FACTOR
+from experiments.record.tables import TRACK_OVER
 from experiments.tasks.questions import correct_columns
 
 
@@ -119,7 +120,8 @@ class _Ruled:
     """A table that rules are applied to, and where in it they find what they are about.
 
     `answers` are the columns of answers, `choices` those of a few named ones, `scored` those of whether one was right;
-    `own_times` gives each column of times with the rows in which it is the participant's own.
+    `own_times` gives each column of times with the rows in which it is the participant's own. Trials that were not
+    presented, as their track had ended, are none that rules are about.
     """
 
     experiment: str
@@ -128,6 +130,12 @@ class _Ruled:
     choices: tuple[str, ...] = ()
     scored: tuple[str, ...] = ()
     own_times: Callable[[pd.DataFrame], Mapping[str, BoolArray]] = lambda _: {}
+
+
+def _planned(table: pd.DataFrame) -> BoolArray:
+    """Which rows are of trials that were to be presented."""
+    over = table["flags"].fillna("").astype(str).str.split().map(lambda flags: TRACK_OVER in flags)
+    return ~over.to_numpy(dtype=np.bool_)
 
 
 def _ruled(logs: Logs) -> Iterator[_Ruled]:
@@ -145,7 +153,7 @@ def _ruled(logs: Logs) -> Iterator[_Ruled]:
 
 
 def _ruled_design(logs: DesignLogs) -> _Ruled:
-    """The table of a design, by its questions; a trial that was never presented is none."""
+    """The table of a design, by its questions."""
     questions = logs.design.questions
     choices = tuple(name for name, question in questions.items() if question.named_answers)
 
@@ -155,7 +163,7 @@ def _ruled_design(logs: DesignLogs) -> _Ruled:
 
     return _Ruled(
         experiment=logs.design.design,
-        table=logs.table[logs.table["attempts"].notna()],
+        table=logs.table,
         answers=tuple(questions),
         choices=choices,
         scored=tuple(correct_columns(questions).values()),
@@ -184,7 +192,8 @@ def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:
             for code, (rule, reason) in sorted(reasons.items())
         ]
         tables[one.experiment] = rows_without(kept, reasons) if reasons else kept
-        trials[one.experiment] = KeptTrials(recorded=len(one.table), kept=len(kept))
+        recorded, left = (int(np.count_nonzero(_planned(table))) for table in (one.table, kept))
+        trials[one.experiment] = KeptTrials(recorded=recorded, kept=left)
     return ExclusionEffect(
         logs=replace(
             logs,
@@ -225,7 +234,8 @@ def _trial_rules(one: _Ruled, rules: TrialRules) -> Iterator[tuple[str, BoolArra
         if rules.response_time_max_s is not None:
             yield "response_time_max_s", own & (time > rules.response_time_max_s)
     if rules.drop_unanswered:
-        yield "drop_unanswered", one.table[[*one.answers]].isna().all(axis=1).to_numpy(dtype=np.bool_)
+        unanswered = one.table[[*one.answers]].isna().all(axis=1).to_numpy(dtype=np.bool_)
+        yield "drop_unanswered", unanswered & _planned(one.table)
 
 
 BY_HAND = "excluded"
@@ -247,8 +257,10 @@ def _reasons(one: _Ruled, kept: pd.DataFrame, rules: Rules) -> Iterator[tuple[st
 
 def _too_few(table: pd.DataFrame, kept: pd.DataFrame, least: float | None) -> Iterator[tuple[str, str, str]]:
     """Who has too few trials left; whoever has none is gone in any case, and is to be listed."""
-    recorded = table["participant_id"].astype(str).value_counts(sort=False)
-    left = kept["participant_id"].astype(str).value_counts(sort=False).reindex(recorded.index, fill_value=0)
+    recorded, remaining = (
+        rows.loc[_planned(rows), "participant_id"].astype(str).value_counts(sort=False) for rows in (table, kept)
+    )
+    left = remaining.reindex(recorded.index, fill_value=0)
     rule = f"at least {least:g} of them" if least else "at least one"
     for code, count, of in zip(recorded.index, left.to_list(), recorded.to_list(), strict=True):
         if count == 0 or count < (least or 0.0) * of:

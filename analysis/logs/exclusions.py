@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from analysis.logs.design_logs import DesignLogs
 from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.logs.measures import MEASURES
 from analysis.logs.reading import Logs
@@ -177,13 +178,27 @@ def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
 
 def by_study(logs: Logs) -> dict[str, Logs]:
     """The logs of each study with plain codes, by the study's name; nothing if there is one study only."""
-    names = sorted({str(name) for table in logs.tables.values() for name in table[STUDY].unique()})
+    every = [*logs.tables.values(), *(one.table for one in logs.designs)]
+    names = sorted({str(name) for table in every for name in table[STUDY].unique()})
     if len(names) < 2:
         return {}
     alone = replace(logs, apart=())
     return {
-        name: replace(alone, trials=_alone(logs.trials, name), ratings=_alone(logs.ratings, name)) for name in names
+        name: replace(
+            alone,
+            trials=_alone(logs.trials, name),
+            ratings=_alone(logs.ratings, name),
+            designs=tuple(_designs_alone(logs, name)),
+        )
+        for name in names
     }
+
+
+def _designs_alone(logs: Logs, study: str) -> Iterator[DesignLogs]:
+    for one in logs.designs:
+        rows = one.table[one.table[STUDY] == study].reset_index(drop=True)
+        if len(rows):
+            yield replace(one, table=rows.assign(participant_id=rows["participant_id"].str.removeprefix(f"{study}/")))
 
 
 def _alone(table: pd.DataFrame, study: str) -> pd.DataFrame:

@@ -117,8 +117,7 @@ def analyze(
             write_report(part, report, tell)
         for path, content in _tables(parts).items():
             placing.write_file(part, path, content)
-    without_effect = [warning for one in parts if one.effect is not None for warning in one.effect.warnings]
-    notes = (*map(str, logs.notes), *without_effect)
+    notes = (*map(str, logs.notes), *_without_effect(parts))
     return report.statistics, (*edited, *_said(logs, report.statistics)), notes
 
 
@@ -155,7 +154,7 @@ def _analysis(
     kept_apart = {one.logs.kind: replace(one.statistics, versions=None) for one in others}
     used = replace(request.files, answered=main.frozen)
     frozen, edited = deviations(first, used) if request.against_frozen else ((), ())
-    warnings = (*main.statistics.warnings, *unchecked_languages(logs.runs))
+    warnings = (*main.statistics.warnings, *_without_effect((main, *others)), *unchecked_languages(logs.runs))
     statistics = replace(
         main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None, warnings=warnings
     )
@@ -174,6 +173,12 @@ def _analysis(
         apart=tuple(_told(one, files.mapping) for one in others),
     )
     return report, (main, *others), edited
+
+
+def _without_effect(parts: Sequence[_Analysed]) -> tuple[str, ...]:
+    """The entries of the rules that mean nobody in data of any kind."""
+    said = [one.effect.warnings for one in parts if one.effect is not None]
+    return tuple(warning for warning in said[0] if all(warning in some for some in said)) if said else ()
 
 
 def _tables(parts: Sequence[_Analysed]) -> dict[str, bytes]:
@@ -302,7 +307,7 @@ def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codeboo
     """What people said in their own words, coded. `ConfigError` if the codebook does not fit that."""
     found = [*_written(logs, statistics)]
     if not found:
-        raise ConfigError("the codebook: no question here was answered in words")
+        raise ConfigError("the codebook: nobody who is analysed was asked for words")
     remarks = [remark for _, remark in found if remark is not None]
     try:
         return remarks_coding.code_remarks(remarks, list(dict.fromkeys(who for who, _ in found)), book)
@@ -313,8 +318,9 @@ def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codeboo
 def _written(logs: Logs, statistics: StudyStatistics) -> Iterator[tuple[str, remarks_coding.WrittenRemark | None]]:
     """What was asked for in words of whom: every analysed participant once at least."""
     if statistics.preference is not None:
-        yield from ((code, None) for code in statistics.preference.participants.codes)
-        yield from _remarks_in(logs.ratings, "comment")
+        analysed = statistics.preference.participants.codes
+        yield from ((code, None) for code in analysed)
+        yield from (one for one in _remarks_in(logs.ratings, "comment") if one[0] in set(analysed))
     for one in logs.designs:
         for name, question in one.design.questions.items():
             if question.kind == "text":
@@ -338,7 +344,6 @@ def _with_rules(statistics: StudyStatistics, effect: ExclusionEffect, rules: Rul
     return replace(
         statistics,
         excluded=(*effect.excluded, *statistics.excluded),
-        warnings=(*statistics.warnings, *effect.warnings),
         rules=RulesApplied(
             file=path.name, config=rules.model_dump(mode="json"), trials=effect.trials, dropped=effect.dropped
         ),

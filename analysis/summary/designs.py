@@ -233,7 +233,7 @@ def answer_scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
 def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.DataFrame]:
     """The rows of each condition in the order of their levels; catch trials, which have no level, come last."""
     if not factors:
-        yield scored
+        yield from [scored] if len(scored) else []
         return
     for _, some in scored.groupby(list(factors), sort=True, dropna=False, observed=True):
         yield some

@@ -61,6 +61,8 @@ def paired_comparison(design: DesignConfig, name: str, table: pd.DataFrame) -> P
         return None
     items = design.factors[factor].all_levels
     rows = table[table[name].notna()]
+    if not len(rows):
+        return None
     found = PairedComparison(factor=factor, items=items, people=rows["participant_id"].nunique())
     if len(items) > MOST_ITEMS:
         return PairedComparison(factor=factor, items=items, people=found.people, reason=f"more than {MOST_ITEMS} items")

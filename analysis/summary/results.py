@@ -403,8 +403,12 @@ class StudyStatistics(NotebookResult):
         for asked, question in self.designs[name].questions.items():
             for cell in question.cells:
                 numbers = {"n": cell.people, "mean": cell.mean, "sd": cell.sd}
-                ends = {"ci_low": cell.ci_low, "ci_high": cell.ci_high}
-                yield {"experiment": name, "question": asked, **cell.levels, **numbers, **ends}
+                numbers |= {"ci_low": cell.ci_low, "ci_high": cell.ci_high}
+                known = {key: math.nan if value is None else value for key, value in numbers.items()}
+                row: dict[str, object] = {"experiment": name, "question": asked}
+                taken = {"data", *row, *known}
+                levels = {f"factor_{key}" if key in taken else key: level for key, level in cell.levels.items()}
+                yield {**row, **levels, **known}
 
     def _tests(self) -> Iterator[str]:
         """Each F test, by what it is of."""
@@ -416,6 +420,7 @@ class StudyStatistics(NotebookResult):
                 tests = (test for test in question.tests if test.name == "anova" and test.reason is None)
                 for test in tests:
                     told = apa.f_test(test.statistic, test.df or (), test.p)
+                    told += f"; corrected {apa.p_value(test.p_gg)}" if test.p_gg is not None else ""
                     yield f"{name.capitalize()}, {asked}, {test.effect}: {told}"
 
     def _repr_html_(self) -> str:

@@ -164,7 +164,7 @@ def of_disk_failure(folder: str, reason: str) -> figures.DoctorFinding:
     return figures.DoctorFinding(check="disk", verdict="fails", measured=f"{folder}: {reason}", advice=advice)
 
 
-MOST_JUMPS = 2
+MOST_JUMPS = 1
 """A gun that is switched on anew does so; one of another speed at every word."""
 
 

@@ -245,7 +245,7 @@ def write_whole(path: Path, data: bytes) -> None:
 def set_aside_file(path: Path) -> Path:
     """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
     number = 1
-    while _aside(path, number).exists():
+    while os.path.lexists(_aside(path, number)):
         number += 1
     return path.rename(_aside(path, number))
 

@@ -200,12 +200,12 @@ def _value(step: steps.Step | None, word: steps.Outcome | Remark, asked: Asking)
 
 
 def repeatable(history: History, step: steps.Step | None, here: Trial) -> Trial | None:
-    """The trial that can be presented again: the one that is asked about, else the last of the set that was felt.
+    """The trial that can be presented again: that at hand, if it has begun, else the last of the set that was felt.
 
     It can be as long as nothing was told of it from memory, when all of its block were felt.
     """
     told = _told_later(history)
-    if isinstance(step, steps.Ask | steps.Rate):
+    if isinstance(step, steps.Ask | steps.Rate) or (isinstance(step, steps.Prepare) and steps.is_begun(step)):
         return None if step.trial in told else step.trial
     last = (trial for trial in reversed(_felt(history)) if of_one_set(trial, here))
     return next((trial for trial in last if trial not in told), None)

@@ -102,9 +102,14 @@ def moved(moment: Moment, event: Event) -> Position:
 
 
 def _is_told_of(position: Position) -> bool:
-    """Whether the participant is being told of the answer that is corrected, which is not true any more."""
+    """Whether the participant is being told of the answer that is corrected, which is not true any more.
+
+    Not after an emergency stop: what is halted stays so.
+    """
     entry, told = position.correcting, position.step
-    return isinstance(told, Inform) and entry is not None and told.trial == entry.trial
+    if position.base is not State.INFORMING or not isinstance(told, Inform):
+        return False
+    return entry is not None and told.trial == entry.trial
 
 
 def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
