@@ -64,7 +64,7 @@ def test_check_prints_design_orders_duration_and_limits_and_runs_nothing(recoil:
     assert not (tmp_path / "results").exists()
 
 
-@pytest.mark.parametrize("config", ["study", "gun", "paper"])
+@pytest.mark.parametrize("config", ["study", "gun", "gun-five", "paper"])
 def test_every_shipped_config_can_be_checked(recoil: Recoil, config: str) -> None:
     assert recoil("check", config).returncode == 0
 

@@ -138,5 +138,23 @@ def test_a_crossing_is_the_first_one_and_says_when_there_is_none() -> None:
         ]
     )
     found = crossings(grid, volts)
-    assert found[:3].tolist() == [1.5, -math.inf, math.inf]
+    assert found[:3].tolist() == [1.5, 1.0, math.inf]
     assert math.isnan(found[3])
+
+
+def test_what_is_not_felt_below_the_first_voltage_of_the_grid_is_no_contour_below_the_range() -> None:
+    volts = np.array([0.0, 8.0, 16.0, 24.0])
+    assert crossings(np.array([[math.nan, 0.8, 0.9, 0.95]]), volts).tolist() == [8.0]
+    assert crossings(np.array([[0.76, 0.8, 0.9, 0.95]]), volts).tolist() == [-math.inf]
+
+
+def test_a_coarse_grid_has_the_contour_of_a_fine_one(fit: PerceptFit) -> None:
+    found = {}
+    for grid in (4, 7):
+        space = make_space(DesignRequest(grid=grid, voltage="0-24", pulse="0.01"))
+        rows = rows_of(space, (0.01,), (0.02,))
+        with on_processes(1) as run:
+            layer = layers(space, rows, simulate_rows(rows, run, lambda _done: None))[0.01]
+        found[grid] = contour_of(space, layer, fit, 1).voltage_V[list(space.friction_N).index(1.12)]
+    assert found[4] == pytest.approx(found[7], abs=0.01)
+    assert found[4] == pytest.approx(7.9, abs=0.1)

@@ -290,3 +290,14 @@ def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
     path.write_text(text.replace('vibration = "55.7"\n', "", 1), encoding="utf-8")
     with pytest.raises(ConfigError, match="has no rate of vibration"):
         read_request(PerceptRequest(paper=str(path)))
+
+
+def test_one_study_is_judged_too_and_a_place_that_cannot_be_is_said_before_the_work(
+    recoil: Recoil, tmp_path: Path
+) -> None:
+    done = recoil("fit", "percept", "--studies", "1", "--out", "one")
+    assert (done.returncode, (tmp_path / "one" / "report.html").exists()) == (0, True), done.stderr
+    (tmp_path / "afile").write_text("")
+    refused = recoil("fit", "percept", "--studies", "1", "--out", "afile")
+    assert (refused.returncode, "percept" in refused.stdout) == (2, False)
+    assert "afile: Not a directory" in refused.stderr

@@ -137,3 +137,9 @@ def test_a_trace_takes_the_place_of_a_file_alone(recoil, tmp_path):
         done = recoil("simulate", "--trace", tmp_path / name)
         assert (done.returncode, f"{tmp_path / name}: {why}" in done.stderr) == (2, True)
     assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_figure_of_another_kind_is_refused_with_those_there_are(recoil, tmp_path):
+    done = recoil("simulate", "--plot", "shot.gif")
+    assert (done.returncode, "figures are PNG, SVG and PDF" in done.stderr) == (2, True)
+    assert not [*tmp_path.glob("shot*")]

@@ -80,7 +80,7 @@ def _meaning(name: str, seed: int | None, participants: int) -> AnyCheck:
         return _design(load_setup(name), seed, participant_codes(participants))
     if "experiments" in table:
         return _study(name, seed)
-    if "methods" in table and "voice_coil" in table:
+    if {"methods", "voice_coil"} & set(table):
         gun = load_gun(path)
         check_methods(gun, tuple(gun.methods), path)
         return GunCheck(gun=gun.title, methods=tuple(gun.methods), assumed=tuple(gun.assumed))

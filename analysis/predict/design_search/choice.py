@@ -7,7 +7,7 @@ the lowest voltage that brings the magnet home already, inf if it never is, NaN 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -268,8 +268,10 @@ def _crossing(row: FloatArray, volts: FloatArray) -> float:
     if not enough.size:
         return math.inf
     at = int(enough[0])
-    if at == some[0]:
+    if at == 0:
         return -math.inf
+    if at == some[0]:  # what is weaker is not felt, so it lies at this voltage or below
+        return float(volts[at])
     before = some[some < at][-1]
     share = (THRESHOLD_SHARE - row[before]) / (row[at] - row[before])
     return float(volts[before] + share * (volts[at] - volts[before]))
@@ -288,7 +290,10 @@ def rate_at(gun: GunParameters, parameters: PerceptParameters) -> float:
 
 
 def _solved(gun: GunParameters, volts: FloatArray, rough_V: float, parameters: PerceptParameters) -> float:
-    """The crossing to a millivolt by shots of its own, within the two voltages of the grid around it."""
+    """The crossing to a millivolt by shots of its own, within the two voltages of the grid around it.
+
+    Where the lower one is not felt at all it is the first that is, if that is enough.
+    """
     if not math.isfinite(rough_V):
         return rough_V
     place = int(np.searchsorted(volts, rough_V))
@@ -297,10 +302,22 @@ def _solved(gun: GunParameters, volts: FloatArray, rough_V: float, parameters: P
     def above(voltage_V: float) -> float:
         return rate_at(replace(gun, voltage_V=voltage_V), parameters) - THRESHOLD_SHARE
 
+    if math.isnan(above(low)):
+        low = _first_felt(above, low, high)
     ends = above(low), above(high)
+    if ends[0] >= 0.0:
+        return low
     if not ends[0] * ends[1] < 0.0:
         return rough_V
     return float(scipy.optimize.brentq(above, low, high, xtol=_CLOSE_V))
+
+
+def _first_felt(above: Callable[[float], float], low: float, high: float) -> float:
+    """The lowest voltage at which there is a percept, to a millivolt; at `high` there is one."""
+    while high - low > _CLOSE_V:
+        middle = (low + high) / 2
+        low, high = (middle, high) if math.isnan(above(middle)) else (low, middle)
+    return high
 
 
 def drawn_contours(felt: FloatArray, volts: FloatArray, fit: PerceptFit, seed: int, draws: int = DRAWS) -> FloatArray:

@@ -120,9 +120,11 @@ def _lines(found: DesignSearch) -> Iterator[str]:
     for one in found.own:
         yield f"{one.name}: {', '.join(_cells(one))} at most."
     critical = found.critical
-    from_ = f"{apa.percent(critical.level, 0)} are right, at a pulse of {_ms(critical.pulse_s)}, from"
+    right = f"{apa.percent(critical.level, 0)} are right, at a pulse of {_ms(critical.pulse_s)}"
     for one in (own for own in found.own if own.swept):
-        yield f"{from_} {_at_friction(critical, one.friction_N)} at {one.friction_N:g} N ({one.name})."
+        said = _at_friction(critical, one.friction_N)
+        from_ = "from " if said[:1].isdigit() else ""
+        yield f"{right}: {from_}{said} at {one.friction_N:g} N ({one.name})."
 
 
 def _best(found: DesignSearch) -> Section:

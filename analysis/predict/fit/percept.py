@@ -50,15 +50,15 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
     """
     task = read_request(request)
     pieces = len(piece_sizes(request.studies, task.published.n)) if task.published else 0
-    with progress("fit", 2 + len(OTHERS) + CASES * pieces) as tell:
-        fit = fit_percept(task.rates, task.methods, trials=task.trials, people=task.people)
-        tell("percept")
-        others = [_other(task, fit, changed, tell) for changed in OTHERS]
-        found = fitted_percept(task, fit, others, fit_assumptions(fit.parameters, task.people))
-        tell("predictions")
-        judged, histograms = _judged(task, request, fit, tell) if pieces else (None, [])
-    found = replace(found, judged=judged)
     with placing.results_in(out, placing.FIT_FILE) as part, labelled(task.labels):
+        with progress("fit", 2 + len(OTHERS) + CASES * pieces) as tell:
+            fit = fit_percept(task.rates, task.methods, trials=task.trials, people=task.people)
+            tell("percept")
+            others = [_other(task, fit, changed, tell) for changed in OTHERS]
+            found = fitted_percept(task, fit, others, fit_assumptions(fit.parameters, task.people))
+            tell("predictions")
+            judged, histograms = _judged(task, request, fit, tell) if pieces else (None, [])
+        found = replace(found, judged=judged)
         storage.write_whole(part / placing.FIT_FILE, as_json(found))
         storage.write_whole(part / "percept.toml", config_text(found).encode())
         write_page(part, f"The percept fitted to {found.source}", sections(found, histograms, part / "figures"))

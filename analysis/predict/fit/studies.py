@@ -379,6 +379,8 @@ def _histogram(values: FloatArray) -> tuple[tuple[float, ...], tuple[float, ...]
         edges = np.arange(finite.min() - 0.5, finite.max() + 1.0)
     else:
         low, high = np.percentile(finite, (0.1, 99.9))
+        if low == high:  # one study, or all alike
+            low, high = low - 0.5, high + 0.5
         edges = np.linspace(low, high, HISTOGRAM_BINS + 1)
     counts, edges = np.histogram(finite, edges)
     return tuple(edges.tolist()), tuple(counts.astype(np.float64).tolist())

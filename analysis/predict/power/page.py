@@ -331,7 +331,8 @@ def grid_assumptions(grid: Grid) -> list[str]:
     return [
         *law,
         "All tests are at 5 %, two-sided; Tukey's test is on the pooled repeated-measures error. A comparison counts "
-        "only if it comes out the way round that the config's means have it; where they are equal, either way counts.",
+        "only if it comes out the way round that the config's means have it; where they are equal, either way counts, "
+        "as always in a binomial test.",
         "Every participant is complete: nobody drops out or misses an answer.",
         "Hours in the lab are participants times the config's own duration (trials and breaks, as `recoil check` has "
         "it), one participant after another, without practice, preparation and no-shows.",

@@ -25,6 +25,9 @@ class ModelRequest:
         return self.scene is not None or bool(self.needs)
 
 
+_OTHER_PICTURES = frozenset([".gif", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".eps", ".ps"])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulateRequest:
     """What to simulate of which gun. `changes` are KEY=VALUE, `vary` KEY=VALUES; `table` takes the shots over these."""
@@ -52,6 +55,8 @@ class SimulateRequest:
             return None
         if self.plot.is_dir():
             raise ConfigError(f"--plot {self.plot}: is a folder; name a file")
+        if self.plot.suffix.lower() in _OTHER_PICTURES:
+            raise ConfigError(f"--plot {self.plot}: figures are PNG, SVG and PDF; name one of these, as in shot.png")
         if self.plot.name.lower() in ("", "..", *FIGURE_ENDINGS):
             raise ConfigError(f"--plot {self.plot}: has no name but its ending; name a file, as in shot.png")
         return self.plot.with_suffix("") if self.plot.suffix.lower() in FIGURE_ENDINGS else self.plot
