@@ -216,3 +216,31 @@ def test_ranks_on_the_participants_own_screen_do_not_tie(configs: Path, tmp_path
     assert [(row["place"], row["place_by"]) for row in table(tmp_path, "places")] == [
         ("1", "participant"), ("2", "participant")
     ]  # fmt: skip
+
+
+def test_what_is_told_of_an_answer_follows_its_correction_but_for_an_emergency_stop(
+    configs: Path, tmp_path: Path
+) -> None:
+    plain = DESIGN[: DESIGN.index("[questions.sure]")] + DESIGN[DESIGN.index("[console]") :]
+    (configs / "tiny.toml").write_text(plain)
+    run = words(configs, "tiny", "--participant", "P01")
+    with virtual_display() as display, AtConsole(run, tmp_path, display) as screen:
+        screen.answer = lambda _: "d"
+        screen.stands(RUN)
+        screen.to("asking", 1)
+        screen.keys.press("d")
+        first = screen.until(lambda look: look.state == "informing" and look.ready)
+        other = "That was wrong." if first.says("That was right.") else "That was right."
+        screen.keys.press("u")
+        screen.at("correcting")
+        screen.keys.press("r")
+        second = screen.until(lambda look: look.state == "informing" and look.serial > first.serial and look.ready)
+        assert second.says(other), second.texts
+        screen.keys.press("F12")
+        halted = screen.until(lambda look: look.state == "halted")
+        screen.keys.press("u", "Control_L")
+        screen.until(lambda look: look.state == "correcting")
+        screen.keys.press("d")
+        screen.until(lambda look: look.state == "halted" and look.serial > halted.serial)
+        assert screen.process.poll() is None
+        screen.kill()
