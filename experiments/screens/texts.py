@@ -159,9 +159,10 @@ def about_text(plan: Plan, asked: Asking, messages: ParticipantMessages = ENGLIS
 
 
 def entry_name(told: History, entry: Asking) -> str:
-    """What an entry is called: by its question's name where several are asked."""
-    several = len({step.question for step, _ in told if isinstance(step, Asking)}) > 1
-    return f"{what(entry)} “{entry.question}”" if several else what(entry)
+    """What an entry is called: with its question's name where several of its kind are asked."""
+    kind = what(entry)
+    alike = {step.question for step, _ in told if isinstance(step, Asking) and what(step) == kind}
+    return f"{kind} “{entry.question}”" if len(alike) > 1 else kind
 
 
 def entry_text(plan: Plan, told: History, entry: Asking) -> str:
