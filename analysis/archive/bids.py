@@ -386,8 +386,8 @@ def _event_table(run: Run, shown: Sequence[Column]) -> bytes:
 
 def _first_pulse(run: Run) -> tuple[datetime | None, bool]:
     """The earliest pulse in a run's rows, and whether its clock was set back."""
-    moments = (as_moment(str(row["onset_utc"] or "")) for row in run.rows)
     back = any(tables.CLOCK_SET_BACK in str(row["flags"] or "").split() for row in run.rows)
+    moments = (as_moment(str(row["onset_utc"] or "")) for row in run.rows)
     return min(filter(None, moments), default=None), back
 
 

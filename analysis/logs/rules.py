@@ -388,13 +388,14 @@ def _onsets(table: _Table) -> Iterator[_LogRule]:
     As in `went_back`: what comes behind a trial that was repeated is compared with the one before that.
     """
     found, none = onset_moments(table.texts.column("onset_utc"))
-    rows, flags = np.flatnonzero(found >= 0), table.texts.column("flags")
-    again = np.array([REPEATED in (text or "").split() for text in flags.to_pylist()], dtype=bool)[rows]
+    rows = np.flatnonzero(found >= 0)
+    flags = [(text or "").split() for text in table.texts.column("flags").to_pylist()]
+    again = np.array([REPEATED in some for some in flags], dtype=bool)[rows]
     last = np.maximum.accumulate(np.where(again, -1, np.arange(rows.size)))
     before = np.concatenate([[-1], last[:-1]])[: rows.size]
     log = table.logs(rows)
     earlier = rows[(before >= 0) & (found[rows] < found[rows[before]]) & (log == log[before])]
-    unsaid = [row for row in earlier.tolist() if CLOCK_SET_BACK not in (flags[row].as_py() or "").split()]
+    unsaid = [row for row in earlier.tolist() if CLOCK_SET_BACK not in flags[row]]
 
     def say(rule: Callable[[str], str], row: int) -> BadLogError:
         return table.fault(rule(table.texts.column("onset_utc")[row].as_py()), row, "onset_utc")

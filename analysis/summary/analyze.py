@@ -318,9 +318,9 @@ def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codeboo
 def _written(logs: Logs, statistics: StudyStatistics) -> Iterator[tuple[str, remarks_coding.WrittenRemark | None]]:
     """What was asked for in words of whom: every analysed participant once at least."""
     if statistics.preference is not None:
-        analysed = statistics.preference.participants.codes
-        yield from ((code, None) for code in analysed)
-        yield from (one for one in _remarks_in(logs.ratings, "comment") if one[0] in set(analysed))
+        analysed = dict.fromkeys(statistics.preference.participants.codes)
+        yield from analysed.items()
+        yield from (one for one in _remarks_in(logs.ratings, "comment") if one[0] in analysed)
     for one in logs.designs:
         for name, question in one.design.questions.items():
             if question.kind == "text":

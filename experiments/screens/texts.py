@@ -165,11 +165,17 @@ def entry_name(told: History, entry: Asking) -> str:
     return f"{kind} “{entry.question}”" if len(alike) > 1 else kind
 
 
+def _which(plan: Plan, told: History, entry: Asking) -> str:
+    """What an entry is about, and its name where that does not tell it from others of its kind."""
+    about, name = about_text(plan, entry), entry_name(told, entry)
+    return about if name == what(entry) else f"{about}, {name}"
+
+
 def entry_text(plan: Plan, told: History, entry: Asking) -> str:
     """An entry with what it says."""
     about, name = about_text(plan, entry), entry_name(told, entry)
-    name = about if name == "answer" else f"{about}, {name}"
-    return f"{name}: {isolated(value_text(entry, entered_value(told, entry)))}"
+    about = about if name == "answer" else f"{about}, {name}"
+    return f"{about}: {isolated(value_text(entry, entered_value(told, entry)))}"
 
 
 def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
@@ -212,9 +218,8 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
 
 
 def _entered_text(plan: Plan, told: History, step: Asking, value: AnswerValue) -> str:
-    said, name = "description" if isinstance(step, Describe) else value_text(step, value), entry_name(told, step)
-    about = about_text(plan, step) if name == what(step) else f"{about_text(plan, step)}, {name}"
-    return f"{about}: {isolated(said)}"
+    said = "description" if isinstance(step, Describe) else value_text(step, value)
+    return f"{_which(plan, told, step)}: {isolated(said)}"
 
 
 def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:
@@ -241,10 +246,9 @@ def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -
     entry = asked_before(told, remark)
     if entry is None:
         return ""
-    about, name = about_text(plan, entry), entry_name(told, entry)
+    about = _which(plan, told, entry)
     if isinstance(entry, Describe):
         return phrase("Saved. {about}: description corrected.", about=about)
-    about = about if name == what(entry) else f"{about}, {name}"
     return phrase("Saved. {about} corrected to {value}.", about=about, value=value_text(entry, remark.value))
 
 
@@ -280,6 +284,11 @@ def typed_line(text: str) -> str:
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
 
 
+def _with_thousands(text: str) -> float:
+    """The number that a text says if its commas part thousands; NaN of any other."""
+    return float(text.replace(",", "")) if _THOUSANDS.fullmatch(text) else math.nan
+
+
 def typed_rating(text: str, scale: Scale) -> float | str:
     """A number as people type it, comma or point, if it lies on the scale; else what to say.
 
@@ -287,10 +296,10 @@ def typed_rating(text: str, scale: Scale) -> float | str:
     """
     try:
         number = float("nan" if "_" in text else text.strip().replace(",", "."))
-        thousands = float(text.replace(",", "")) if _THOUSANDS.fullmatch(text.strip()) else math.nan
     except ValueError:
-        number = thousands = math.nan
-    if scale.minimum <= thousands <= scale.maximum:
+        number = math.nan
+    thousands = _with_thousands(text.strip())
+    if not math.isnan(number) and scale.minimum <= thousands <= scale.maximum:
         return phrase(
             "{text} may be {number:g} or {thousands:.15g}: type it without a comma.",
             text=text.strip(),

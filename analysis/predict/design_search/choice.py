@@ -1,7 +1,7 @@
 """Predicted rates of designs, which of them are worth it, and from which voltage a direction is felt at all.
 
 That voltage, at each friction, is the lowest of the sweep above which a direction is felt well enough; -inf if it is at
-the lowest voltage that brings the magnet home already, inf if it never is, NaN if no voltage brings it home.
+the lowest voltage of the sweep already, inf if it never is, NaN if no voltage brings the magnet home.
 """
 
 from __future__ import annotations
@@ -302,12 +302,13 @@ def _solved(gun: GunParameters, volts: FloatArray, rough_V: float, parameters: P
     def above(voltage_V: float) -> float:
         return rate_at(replace(gun, voltage_V=voltage_V), parameters) - THRESHOLD_SHARE
 
-    if math.isnan(above(low)):
+    at_low, at_high = above(low), above(high)
+    if math.isnan(at_low) and at_high >= 0.0:
         low = _first_felt(above, low, high)
-    ends = above(low), above(high)
-    if ends[0] >= 0.0:
+        at_low = above(low)
+    if at_low >= 0.0:
         return low
-    if not ends[0] * ends[1] < 0.0:
+    if not at_low * at_high < 0.0:
         return rough_V
     return float(scipy.optimize.brentq(above, low, high, xtol=_CLOSE_V))
 

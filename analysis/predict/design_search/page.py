@@ -122,9 +122,7 @@ def _lines(found: DesignSearch) -> Iterator[str]:
     critical = found.critical
     right = f"{apa.percent(critical.level, 0)} are right, at a pulse of {_ms(critical.pulse_s)}"
     for one in (own for own in found.own if own.swept):
-        said = _at_friction(critical, one.friction_N)
-        from_ = "from " if said[:1].isdigit() else ""
-        yield f"{right}: {from_}{said} at {one.friction_N:g} N ({one.name})."
+        yield f"{right}: {_at_friction(critical, one.friction_N, 'from ')} at {one.friction_N:g} N ({one.name})."
 
 
 def _best(found: DesignSearch) -> Section:
@@ -188,8 +186,8 @@ def _share_cell(one: DrivePrediction) -> str:
     return f"{apa.percent(one.predicted)} {apa.interval(100.0 * one.ci_low, 100.0 * one.ci_high, 1)}"
 
 
-def _at_friction(critical: Critical, friction_N: float) -> str:
-    """The contour's voltage at a friction, with its band, or why there is none."""
+def _at_friction(critical: Critical, friction_N: float, before: str = "") -> str:
+    """The contour's voltage at a friction, with its band and what stands before it, or why there is none."""
     if friction_N not in critical.friction_N:
         return "outside the swept frictions"
     place = critical.friction_N.index(friction_N)
@@ -197,7 +195,7 @@ def _at_friction(critical: Critical, friction_N: float) -> str:
     if not np.isfinite(voltage_V):
         return critical.reached[place]
     low, high = _end(band.low_V[place], band.reached_low[place]), _end(band.high_V[place], band.reached_high[place])
-    return f"{apa.number(voltage_V, 1)} V [{low}, {high}]"
+    return f"{before}{apa.number(voltage_V, 1)} V [{low}, {high}]"
 
 
 def _end(voltage_V: float, reached: str) -> str:
