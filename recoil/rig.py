@@ -17,7 +17,7 @@ from device.twin.twin import Make, Troubles, Twin
 from experiments.clock import RealClock
 from experiments.doctor.checks import GunLeftArmed, LanguageAsked, carry_out_check, checks
 from experiments.doctor.figures import DoctorFinding
-from experiments.doctor.verdicts import overall
+from experiments.doctor.verdicts import not_fired, overall
 from experiments.load import find, load_gun
 from experiments.record import storage
 from experiments.study.folders import PlaceError
@@ -142,7 +142,8 @@ def examine(
     with progress("doctor", len(planned)) as tell:
         try:
             for check in planned:
-                findings += carry_out_check(check)
+                fails = check.name == "shots" and any(one.check == "gun" and one.verdict == "fails" for one in findings)
+                findings += (not_fired(),) if fails else carry_out_check(check)
                 tell(check.name)
         except GunLeftArmed as left:
             findings += left.found

@@ -179,3 +179,12 @@ def test_a_twin_in_a_hurry_is_refused_where_people_answer(recoil, who):
         check_pace("terminal", "serial:/dev/pts/9?speed=20")
     check_pace("terminal", "serial:/dev/pts/9")
     check_pace("synthetic", "serial:/dev/pts/9?speed=20")
+
+
+def test_a_doctor_does_not_fire_a_gun_whose_clock_is_not_that_of_its_address(recoil, tmp_path):
+    with a_twin(tmp_path, speed=1.0) as (twin, socket):
+        done = recoil("doctor", "--gun", f"serial:{socket.address}?speed=50", "--fire", "3", "--json")
+        found = {one["check"]: one for one in json.loads(done.stdout)["checks"]}
+        assert "leave ?speed out" in found["gun"]["advice"]
+        assert found["shots"]["measured"] == "nothing was fired: the gun fails"
+        assert twin.body.ledger == []

@@ -195,12 +195,17 @@ def of_link_failure(reason: str) -> figures.DoctorFinding:
     return figures.DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
 
 
+def not_fired() -> figures.DoctorFinding:
+    """A gun that fails before a shot: it is not fired."""
+    advice = "see to what “gun” says, then look again"
+    return figures.DoctorFinding(
+        check="shots", verdict="fails", measured="nothing was fired: the gun fails", advice=advice
+    )
+
+
 def of_conformance(found: Sequence[ConformanceFinding]) -> figures.DoctorFinding:
     """Whether the gun keeps what every gun keeps, by `device.plugin.conformance`."""
     measured = "; ".join(f"{one.check}: {one.said}" for one in found if not one.kept)
-    if [one.check for one in found] == ["opening"]:
-        advice = "the gun did not open, so nothing was tried: close what else has it open, and see to what “gun” says"
-        return figures.DoctorFinding(check="shots", verdict="fails", measured=found[0].said, advice=advice)
     advice = "nobody may hold this gun: it does not keep what every gun keeps; mend it, or the plug-in that brings it"
     if measured:
         return figures.DoctorFinding(check="shots", verdict="fails", measured=measured, advice=advice)
