@@ -289,6 +289,11 @@ class Identity:
     version: str
     serial: str
 
+    @property
+    def name(self) -> str:
+        """Who renders, as the tables say it: `simulated`, or model and serial number."""
+        return self.model if self.model == self.serial else f"{self.model}:{self.serial}"
+
 
 GunState = Literal["disarmed", "armed", "resetting", "fault"]
 

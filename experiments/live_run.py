@@ -102,6 +102,7 @@ class LiveRun:
     ) -> None:
         self.plan, self.clock, self.guard_s = plan, clock, guard_s
         self.gun, self.journal, self._screen = gun, journal, screen
+        self.gun_name = gun.identify().name
         self._told: GrowingHistory = [] if told is None else told
         self._history = list(self._told)
         self._position = Position(since_s=clock.now())

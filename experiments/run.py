@@ -39,7 +39,7 @@ from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
 from experiments.record.replay import RunPosition
 from experiments.run_request import RunRequest, resolve_seed
-from experiments.runner import Desk, carry_out, gun_name
+from experiments.runner import Desk, carry_out
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Noted
@@ -127,7 +127,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 guard_s=setup.config.console.guard_s,
                 told=told,
             )
-            desk = Desk(live=live, gun_name=gun_name(gun.identify()), stimuli=stimuli)
+            desk = Desk(live=live, stimuli=stimuli)
             screen.begin(live)
             if not request.sensor and _was_measured(before):
                 screen.trouble(UNMEASURED)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
-from device.words import Identity
 from experiments.design.plan import Trial
 from experiments.design.stimuli import Stimuli
 from experiments.live_run import Held, LiveRun, RunStopped
@@ -28,10 +27,9 @@ from experiments.tasks.questions import on_scale
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
-    """All that carries steps out: the live run with its gun, what that is called, and what it can fire."""
+    """All that carries steps out: the live run with its gun, and what that can fire."""
 
     live: LiveRun
-    gun_name: str
     stimuli: Stimuli
 
 
@@ -71,7 +69,7 @@ class Train:
     def presented(self, ended_by: Literal["next", "limit"]) -> steps.Presented:
         """The stimulus as it was felt to its end."""
         return steps.Presented(
-            gun=self._desk.gun_name,
+            gun=self._live.gun_name,
             onset_utc=self._onset_utc,
             shots=self.shots,
             exposure_s=self._exposure_s(),
@@ -94,11 +92,6 @@ MAX_FAILURES = 3
 
 class Unforeseen(TypeError):  # noqa: N818 - a fault of the program
     """The table took an event for a step that knows none of its kind."""
-
-
-def gun_name(identity: Identity) -> str:
-    """Who renders, as the tables say it: `simulated`, or model and serial number."""
-    return identity.model if identity.model == identity.serial else f"{identity.model}:{identity.serial}"
 
 
 def carry_out(session: steps.Session, desk: Desk, position: RunPosition) -> None:
@@ -348,7 +341,7 @@ class DeskGun:
             disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
         return steps.Fired(
-            gun=self._desk.gun_name,
+            gun=self._live.gun_name,
             onset_utc=onset_utc,
             requested_s=report.requested_s,
             pulse_start_s=report.pulse_start_s,
@@ -365,7 +358,7 @@ class DeskGun:
         utc, now_s = self._live.clock.utc(), self._live.clock.now()
         self._live.stimulus_begins(now_s)
         return steps.Fired(
-            gun=self._desk.gun_name,
+            gun=self._live.gun_name,
             onset_utc=utc,
             requested_s=now_s,
             pulse_start_s=now_s,

@@ -29,6 +29,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered
 from experiments.study.balance import journals, unread
+from experiments.study.enrolment import not_on_record
 from experiments.study.folders import Place, PlaceError, check_code, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
@@ -103,14 +104,24 @@ def _say(text: str) -> None:
 
 
 def _say_beforehand(request: RunRequest) -> None:
-    """Whose journals cannot be read, and what is not as it was frozen: no reason to send this participant home."""
+    """Whose journals cannot be read, what is not as it was frozen, and what of the participant is not on record.
+
+    All of it is no reason to send this participant home.
+    """
     setup, results = request.setup, request.results
     there = journals(results, setup.config.experiment)
     for message in (
         *unread(setup, results, read_register(results)),
         *few_of_each(run_warnings(setup, results, there)),
+        *_not_on_record(request),
     ):
         _say(message)
+
+
+def _not_on_record(request: RunRequest) -> Iterator[str]:
+    """The start window asks by itself, and nobody is asked about synthetic people."""
+    if request.participant_id and not request.simulated:
+        yield from filter(None, [not_on_record(request.results, request.participant_id)])
 
 
 def _check_resumable(request: RunRequest) -> None:
@@ -191,7 +202,7 @@ def check_pace(screen: str, gun: str) -> None:
 def _at_terminal(request: RunRequest) -> Finished:
     def screen(_: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
         messages = request.language.messages
-        return TerminalScreen(plan, clock, simulated=request.gun == "simulated", messages=messages)
+        return TerminalScreen(plan, clock, messages=messages)
 
     return run(request, screen, RealClock())
 

@@ -160,7 +160,7 @@ def undone_run(setup: Setup[DesignConfig], plan: Plan, folder: Path, seed: int, 
         first = next(going)
         journal.append("step", body=step_record(first))
         screen.begin(live)
-        carry_out(going, Desk(live=live, gun_name="simulated", stimuli=stimuli), RunPosition(step=first))
+        carry_out(going, Desk(live=live, stimuli=stimuli), RunPosition(step=first))
     return read_journal(path)
 
 

@@ -138,7 +138,7 @@ class Sitting(NamedTuple):
             told=told,
         )
         stimuli = stimuli_of(self.setup.config, self.setup.gun)
-        desk = Desk(live=live, gun_name="simulated", stimuli=stimuli)
+        desk = Desk(live=live, stimuli=stimuli)
         self.screen.begin(live)
         with self.journal:
             first = next(going)

@@ -265,6 +265,7 @@ def test_a_gun_that_went_silent_before_the_emergency_stop_is_never_shown_as_disa
     ):
         screen.stands(RUN)
         screen.to("asking", trial=1)
+        screen.until(lambda look: look.says("SIMULATED GUN – nothing is felt"))  # a twin is one as well
         with kept(address):
             twin.send_signal(number)
             screen.keys.press("F12")

@@ -16,6 +16,7 @@ from experiments.study.folders import PlaceError
 from recoil.rig import troubles_of
 from recoil.session import check_pace
 from tests.at_runs import shorten
+from tests.at_terminal import AtTerminal
 from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, resumed, rows, run_all, timings_of
 from tests.twins import Troubles, a_twin
 from tests.waiting import PATIENCE_S, wait_for
@@ -129,6 +130,14 @@ def test_a_run_that_is_killed_leaves_the_gun_disarmed(tmp_path, quick_configs, n
         left_to_the_watchdog = WireError.WATCHDOG in twin.core.errors
         assert left_to_the_watchdog == (number == signal.SIGKILL)
         assert twin.core.machine.due_us() is None  # nothing comes any more
+
+
+def test_a_twin_at_a_terminal_is_called_simulated(tmp_path, quick_configs):
+    with a_twin(tmp_path, speed=1.0) as (_, socket):
+        words = ("run", quick_configs / "direction.toml", "--participant", "P01", "--gun", f"serial:{socket.address}")
+        with AtTerminal(warm(*words), tmp_path) as sitting:
+            sitting.wait_for("Trial 1 of 20")
+            assert "SIMULATED GUN – nothing is felt.\nParticipant P01" in sitting.seen
 
 
 def test_the_doctor_measures_the_way_to_a_gun_on_a_line(recoil, plugged, quick_configs):

@@ -17,8 +17,10 @@ from experiments.record.journal import hold_journal
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.enrolment import not_on_record
 from experiments.study.register import append, entry
 from recoil.config_files import new_study
+from tests.at_terminal import AtTerminal
 from tests.conftest import Recoil, refused
 from tests.waiting import PATIENCE_S
 from tests.warm_start import warm
@@ -335,6 +337,33 @@ def test_a_fact_that_the_study_does_not_ask_for_is_refused(recoil: Recoil, pilot
     (pilot / "study.toml").write_text(text[: text.index("[eligibility]")])
     refused(recoil("study", "pilot", "--join", "P01", "--age", 25), "age_years", "does not ask")
     assert told(recoil, "--join", "P01")["participants"][0]["facts"]["age_years"] is None
+
+
+def asked(pilot: Path, code: str = "P01") -> str:
+    return not_on_record(pilot / "results", code)
+
+
+def test_a_run_says_what_the_study_asks_for_and_nobody_said(recoil: Recoil, pilot: Path) -> None:
+    missing = "participant P01: age, sex, handedness not on record (rules: "
+    assert asked(pilot).startswith(missing)
+    words = warm("run", pilot / "direction.toml", "--participant", "P01", "--results", pilot / "results")
+    with AtTerminal(words, pilot) as sitting:
+        sitting.wait_for(f"recoil: {missing}")
+        sitting.wait_for("Trial 1 of 20")
+    recoil("study", "pilot", "--join", "P01", *RIGHT)
+    assert asked(pilot) == ""
+    recoil("study", "pilot", "--join", "P01", *RIGHT[2:], "--age", "70")
+    assert "P01: not eligible: age_years = 70: must be at most 29 (rules: " in asked(pilot)
+
+
+def test_a_run_says_nothing_of_facts_where_none_are_asked_for(pilot: Path) -> None:
+    text = (pilot / "study.toml").read_text()
+    (pilot / "study.toml").write_text(text[: text.index("[eligibility]")])
+    assert asked(pilot) == ""
+    (pilot / "study.toml").write_text("title = 1")
+    assert "study.toml:1: title = 1" in asked(pilot)
+    (pilot / "study.toml").unlink()
+    assert asked(pilot) == ""
 
 
 def test_a_folder_that_is_no_study_is_refused(recoil: Recoil, tmp_path: Path) -> None:

@@ -48,7 +48,6 @@ from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.record.provenance import recoil_version
-from experiments.runner import gun_name
 from experiments.screens.display import unset_display
 from experiments.study.folders import PlaceError
 
@@ -145,7 +144,7 @@ ADAPTERS = Path("/sys/bus/usb-serial/devices")
 def gun_line(opened: Callable[[], Gun]) -> GunLine:
     """Ask a gun who it is and how it stands, many times. `DeviceError` if it does not answer."""
     with closing(opened()) as gun:
-        name = gun_name(gun.identify())
+        name = gun.identify().name
         gun.disarm()
         times = timed_ms(ROUND_TRIPS, gun.status)
         status = gun.status()

@@ -16,6 +16,7 @@ from device import GunStatus
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
+from experiments.record.tables import is_simulated
 from experiments.screens import texts
 from experiments.session import events
 from experiments.session.events import Event, Press
@@ -52,10 +53,9 @@ class TerminalScreen:
         lines: TextIO | None = None,
         out: TextIO | None = None,
         *,
-        simulated: bool = False,
         messages: ParticipantMessages = ENGLISH_MESSAGES,
     ) -> None:
-        self._plan, self._clock, self._simulated, self._messages = plan, clock, simulated, messages
+        self._plan, self._clock, self._messages = plan, clock, messages
         self._out = out or sys.stdout
         if isinstance(sys.stdin, io.TextIOWrapper):
             sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
@@ -68,7 +68,7 @@ class TerminalScreen:
     def begin(self, live: LiveRun) -> None:
         """Say who it is, and begin to read."""
         self._live = live
-        band = "SIMULATED GUN – nothing is felt.\n" if self._simulated else ""
+        band = "SIMULATED GUN – nothing is felt.\n" if is_simulated(live.gun_name) else ""
         self._say(f"{band}Participant {self._plan.participant_id}, experiment {self._plan.experiment}.\n{_HELP}")
         for target in (self._read, self._count_down):
             threading.Thread(target=target, daemon=True, name="terminal").start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import get_args
 from pydantic import ValidationError
 
 from experiments.clock import Clock
-from experiments.config.door import EligibilityConfig, Fact
+from experiments.config.door import ConfigError, EligibilityConfig, Fact
+from experiments.load import load_study
 from experiments.record.journal import JournalError
 from experiments.study import folders, register
 from experiments.study.folders import PlaceError, StudyFolder, look_at
+from experiments.study.preregistration import STUDY_FILE
 from experiments.study.register import RegisterError
 from experiments.study.study import Facts, Participant, RunProgress, eligible, unanswered, unasked
 
@@ -192,6 +195,30 @@ def _refuse_wrong_facts(study: StudyFolder, facts: Facts) -> None:
         raise PlaceError(f"not given: {', '.join(missing)}; {study.source} asks for it (eligibility.ask)")
     if surplus:
         raise PlaceError(f"{', '.join(surplus)}: {study.source} does not ask for it (eligibility.ask); leave it out")
+
+
+def not_on_record(results: Path, participant_id: str) -> str:
+    """Why somebody would not be taken in who runs all the same: what the study asks for and nobody said, or its rules.
+
+    Empty if all is well, and where the results lie in no study.
+    """
+    source = Path(os.path.normpath(results / ".." / STUDY_FILE))
+    if not source.is_file():
+        return ""
+    try:
+        rules = load_study(str(source))[0].eligibility
+    except ConfigError as error:
+        return str(error)
+    member = register.read_register(results).members.get(participant_id)
+    facts = (member and member.facts) or Facts()
+    missing, reasons = unanswered(facts, rules), eligible(facts, rules)
+    if not (missing or reasons):
+        return ""
+    said = f"{', '.join(map(fact_text, missing))} not on record" if missing else f"not eligible: {'; '.join(reasons)}"
+    return (
+        f"participant {participant_id}: {said} (rules: {source}); the run goes on all the same; "
+        f"`recoil study {results} --join {participant_id}` with their facts puts them on record"
+    )
 
 
 def exclude(results: Path, participant_id: str, reason: str, clock: Clock) -> None:

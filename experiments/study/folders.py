@@ -24,7 +24,6 @@ from experiments.load import load_setup, load_study, shipped_folder
 from experiments.rebuild import began_with
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
-from experiments.runner import gun_name
 from experiments.session.history import answered
 from experiments.study import register
 from experiments.study.balance import group_of_next_run, row_of_next_run
@@ -364,7 +363,7 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
 
 def data_of(head: Head) -> tables.DataKind:
     """Whose data a run gives, by the first record of its journal."""
-    simulated = head.gun is not None and tables.is_simulated(gun_name(head.gun))
+    simulated = head.gun is not None and tables.is_simulated(head.gun.name)
     return tables.data_kind(synthetic=head.participant == "synthetic", simulated=simulated)
 
 

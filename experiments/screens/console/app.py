@@ -220,7 +220,6 @@ class Console:
             plan=plan,
             band=self._band,
             last=self._last,
-            simulated=self._request.gun == "simulated",
             participant_rates=self.participant is not None and self.participant.rates,
             participant_keys=self.participant is not None and self.participant.own_keys,
             messages=self._request.language.messages,

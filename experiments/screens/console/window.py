@@ -5,12 +5,15 @@ It decides nothing: keys and buttons become events, and the table of states judg
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import QCoreApplication, QEvent, QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 
 from experiments.clock import Clock
 from experiments.live_run import LiveRun
+from experiments.record.tables import is_simulated
 from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
@@ -118,6 +121,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     def begin(self, live: LiveRun, controls: Controls) -> None:
         """A live run is there, and who works it."""
         self.live, self.controls, self._painted = live, controls, -1
+        self.about = replace(self.about, simulated=is_simulated(live.gun_name))
         self._tracks = adaptive_tracks(self.about.setup.config, self.about.plan, self._told)
 
     def take(self, message: view.Message) -> None:
