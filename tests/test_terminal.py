@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from tests.at_terminal import DAMPER, FIRES, AtTerminal
+from tests.waiting import wait_for
 from tests.warm_start import warm
 
 pytestmark = pytest.mark.slow
@@ -74,6 +75,23 @@ def test_experiment_1_from_the_first_hand_over_to_the_table(short_configs: Path,
     assert {row["response_time_valid"] for row in table} == {"0"}
     journal = (tmp_path / "results/sub-P01/sub-P01_task-direction_journal.jsonl").read_text()
     assert journal.count('"cut_reason":"fire drill"') == 2
+
+
+@pytest.mark.parametrize(
+    ("terminal", "count"), [("xterm", r"\x1b7\r    [45]\d s \x1b8"), ("dumb", r"\r    [45]\d s (?!\x1b)")]
+)
+def test_a_break_is_counted_beside_what_is_typed(
+    short_configs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, terminal: str, count: str
+) -> None:
+    """A terminal that can go back to where it was has the count before what is typed, and leaves that as it stands."""
+    monkeypatch.setenv("TERM", terminal)
+    with AtTerminal(run(short_configs, "direction", "--seed", 3), tmp_path) as screen:
+        screen.answer_trials(4)
+        screen.wait_for("Break between sessions: 60 s")
+        wait_for(lambda: re.search(count, screen.seen) is not None)
+        shown = screen.seen.partition("Break between sessions")[2]
+    assert shown.partition("early.)\n")[2].startswith(" " * 9)
+    assert (terminal == "xterm") == ("\x1b" in shown)
 
 
 def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_like_a_formula(

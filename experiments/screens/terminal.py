@@ -7,6 +7,7 @@ experimenter's hand and are logged as such. Neither correctness nor a score is e
 from __future__ import annotations
 
 import io
+import os
 import sys
 import threading
 from contextlib import suppress
@@ -134,7 +135,7 @@ class TerminalScreen:
             case State.DESCRIBING if isinstance(step, Describe):
                 return f"\n  {texts.about_text(self._plan, step, self._messages)}. {step.text} "
             case State.RESTING:
-                return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n"
+                return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n{' ' * _COUNTED}"
             case State.CLOSING:
                 return _CLOSING
             case State.PAUSED:
@@ -217,7 +218,7 @@ class TerminalScreen:
             with self._lock:
                 position = self._shown
                 if position.state is State.RESTING and position.until_s is not None:
-                    self._show(f"\r  {max(0.0, position.until_s - self._clock.now()):4.0f} s ")
+                    self._show(_counted(max(0.0, position.until_s - self._clock.now())))
 
     def _say(self, text: str) -> None:
         self._show(f"{text}\n")
@@ -242,6 +243,15 @@ class TerminalScreen:
             self._gone = True
             stop = events.Stop(reason="the terminal was closed")
             threading.Thread(target=live.offer, args=(stop,), daemon=True).start()
+
+
+_COUNTED = len("  1800 s ")
+
+
+def _counted(left_s: float) -> str:
+    """A count at the start of a line that leaves what is typed behind it as it stands, where a terminal can do that."""
+    text = f"\r  {left_s:4.0f} s "
+    return text if os.environ.get("TERM", "dumb") == "dumb" else f"\x1b7{text}\x1b8"
 
 
 def _corrects_words(position: Position) -> bool:
