@@ -144,6 +144,7 @@ def test_figure_8_shows_both_experiments_or_the_one_there_is(statistics: StudySt
     text = both_svg.read_text(encoding="utf-8")
     for words in ("correct rate, forward [%]", "rating (0 dislike", "Force II", "6 synthetic participants", "chance"):
         assert words in text
+    assert "(b) Preference" in text
     assert "mean and SD" not in text  # its caption says it
 
 
@@ -273,7 +274,10 @@ def test_a_figure_of_one_participant_and_four_unknown_methods_is_drawn(tmp_path:
     found = summarize(read_logs([tmp_path]))
     assert found.preference is not None
     assert len(found.preference.methods) == 4
-    figure_8(found, tmp_path / "few")
+    _, svg, _ = files_of(figure_8, found, tmp_path / "few")
+    text = svg.read_text(encoding="utf-8")
+    assert "Preference" in text
+    assert "(a)" not in text  # there is no other panel
 
 
 def test_without_data_there_is_no_figure(tmp_path: Path) -> None:

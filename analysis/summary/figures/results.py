@@ -89,7 +89,12 @@ def figure_8(statistics: StudyStatistics, path_stem: Path, rated_from: tuple[flo
     with drawn(path_stem, 0.4 + (0.9 + max(widest, 3)) * len(panels), height_in) as figure:
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for i, (axes, panel) in enumerate(zip(row, panels, strict=True)):
-            _draw_panel(axes, panel, found[panel.experiment], chr(ord("a") + i))
+            _draw_panel(axes, panel, found[panel.experiment], _lettered(i, len(panels), panel.title))
+
+
+def _lettered(i: int, panels: int, title: str) -> str:
+    """The title of a panel, with its letter where there are several."""
+    return f"({chr(ord('a') + i)}) {title}" if panels > 1 else title
 
 
 def _rated_otherwise(panel: _Panel, rated_from: tuple[float, float] | None) -> _Panel:
@@ -119,7 +124,7 @@ def _draw_stacked(panels: Sequence[_Panel], found: Mapping[str, WithinStatistics
     with drawn(path_stem, width, sum(tall) + 0.7 * len(shown)) as figure:
         rows = iter(figure.subplots(len(tall), 1, squeeze=False, height_ratios=tall)[:, 0])
         for i, (panel, one) in enumerate(shown):
-            _draw_panel(next(rows), panel, one, chr(ord("a") + i))
+            _draw_panel(next(rows), panel, one, _lettered(i, len(panels), panel.title))
             if has_matrix(one):
                 _draw_matrix(next(rows), one)
 
@@ -147,7 +152,7 @@ def _draw_matrix(axes: Axes, found: WithinStatistics) -> None:
     axes.spines[:].set_visible(False)
 
 
-def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, letter: str) -> None:
+def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, title: str) -> None:
     methods = found.methods
     light_grid(axes)
     if panel.chance is not None:
@@ -161,7 +166,7 @@ def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, letter: str)
     name_ticks(axes, methods)
     axes.set_xlabel(found.people, fontsize=8.0, labelpad=8.0)
     axes.set_ylabel(panel.label)
-    axes.set_title(f"({letter}) {panel.title}", loc="left", fontweight="bold")
+    axes.set_title(title, loc="left", fontweight="bold")
 
 
 def _draw_bars(axes: Axes, panel: _Panel, found: WithinStatistics, methods: Sequence[str]) -> float:
@@ -248,16 +253,16 @@ def figure_directions(found: DirectionStatistics, path_stem: Path) -> None:
     panels = (1 + len(measures)) if many else 2 if measures else 1
     with drawn(path_stem, min(width, width_for(99)), 3.8 * panels if panels > 1 else 4.2) as figure:
         rows = figure.add_gridspec(panels, 1 if many else 2)
-        _draw_rates(figure.add_subplot(rows[0, :]), found)
+        _draw_rates(figure.add_subplot(rows[0, :]), found, _lettered(0, 1 + len(measures), "Correct rate"))
         for i, measure in enumerate(measures):
             place = rows[1 + i, :] if many else rows[1, i]
-            _draw_measure(figure.add_subplot(place), found, measure, chr(ord("b") + i))
+            _draw_measure(figure.add_subplot(place), found, measure, _lettered(1 + i, 1 + len(measures), measure.title))
         _explain(figure, found)
 
 
-def _draw_rates(axes: Axes, found: DirectionStatistics) -> None:
+def _draw_rates(axes: Axes, found: DirectionStatistics, title: str) -> None:
     methods = found.methods
-    _frame(axes, methods, "(a) Correct rate", "correct rate [%]")
+    _frame(axes, methods, title, "correct rate [%]")
     reference_line(axes, 50.0, "chance")
     for i, method in enumerate(methods):
         _draw_pair(axes, found, method, i)
@@ -293,9 +298,9 @@ def _draw_pair(axes: Axes, found: DirectionStatistics, method: str, i: int) -> N
         )
 
 
-def _draw_measure(axes: Axes, found: DirectionStatistics, measure: _Measure, letter: str) -> None:
+def _draw_measure(axes: Axes, found: DirectionStatistics, measure: _Measure, title: str) -> None:
     methods = found.methods
-    _frame(axes, methods, f"({letter}) {measure.title}", measure.label)
+    _frame(axes, methods, title, measure.label)
     reference_line(axes, 0.0, measure.zero)
     limit = _largest_d_prime(found) if measure.key == "d_prime" else None
     if limit is not None:
