@@ -49,6 +49,8 @@ def few_of_each(messages: Iterable[str]) -> Iterator[str]:
 
     >>> list(few_of_each(f"P{n}: no answer" for n in range(200)))[-2:]
     ['P4: no answer', '... and 195 more like it']
+    >>> list(few_of_each(["a", *(f"P{n}: edited; `recoil rebuild /x/{n}` helps" for n in range(7))]))[-1]
+    '... and 2 more like it (edited)'
     """
     seen: Counter[str] = Counter()
     for message in messages:
@@ -58,7 +60,8 @@ def few_of_each(messages: Iterable[str]) -> Iterator[str]:
             yield message
     for kind, count in seen.items():
         if count > _LIKE:
-            said = kind.rpartition(": ")[2] if len(seen) > 1 else ""
+            tail = kind.rpartition(": ")[2] if len(seen) > 1 else ""
+            said = tail if tail.count("`") % 2 == 0 else tail.partition("`")[0].rstrip("; ")
             yield f"... and {count - _LIKE} more like it{f' ({said.strip()})' if said else ''}"
 
 

@@ -15,6 +15,7 @@ from analysis.stats.diagnostics import sphericity
 from analysis.summary.assumptions import not_spherical
 from analysis.summary.designs import summarise
 from analysis.summary.results import StudyStatistics
+from analysis.summary.sections.designs import lacking_conditions
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
@@ -128,6 +129,41 @@ def test_whoever_lacks_a_condition_is_named_and_in_no_test():
     assert found.left_out == (table.loc[0, "participant_id"],)
     assert found.tests[0].df == (2, 8)
     assert sum(cell.trials for cell in found.cells) == 17
+
+
+def test_whoever_answered_a_question_never_is_named_as_well():
+    config, laws = loaded("preference")
+    table = simulated(config, laws, 6)
+    table.loc[0, "rating"] = np.nan
+    table.loc[table["participant_id"] == "P03", "rating"] = np.nan
+    found = summarise(config, table)
+    assert found.questions["rating"].left_out == ("P00", "P03")
+    assert found.questions["rating"].tests[0].df == (2, 6)
+    assert [*lacking_conditions(found)] == ["In no test of rating, with no answer in some condition: P00, P03."]
+
+
+def test_numbers_of_0_or_less_are_told_and_no_missing_answers():
+    config, laws = loaded("magnitude")
+    table = simulated(config, laws, 6)
+    level = table["pulse_s"].iloc[0]
+    for who, number in (("P02", 0.0), ("P04", -3.0)):
+        table.loc[(table["participant_id"] == who) & (table["pulse_s"] == level), "strength"] = number
+    found = summarise(config, table)
+    asked = found.questions["strength"]
+    shots = int((table["pulse_s"] == level).sum()) // 6
+    assert (asked.left_out, asked.not_above_0) == (("P02", "P04"), 2 * shots)
+    assert [*lacking_conditions(found)] == [
+        "In no test of strength, with no number above 0 in some condition: P02, P04.",
+        f"In no mean and no test of strength: {2 * shots} numbers of 0 or less, which have no logarithm.",
+    ]
+
+
+def test_numbers_by_methods_have_no_exponent():
+    questions = {"q": {"kind": "number", "text": "?"}}
+    config = design(factors={"method": {"levels": ["a", "b", "c"]}}, questions=questions)
+    rows = [(f"P{n}", method, float(n + k)) for n in range(1, 5) for k, method in enumerate("abc")]
+    found = summarise(config, pd.DataFrame(rows, columns=["participant_id", "method", "q"]))
+    assert [test.name for test in found.questions["q"].tests] == ["anova", "tukey", "tukey", "tukey"]
 
 
 def test_a_single_person_is_described_and_not_tested():

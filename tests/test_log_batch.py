@@ -256,6 +256,27 @@ def test_files_are_found_in_the_order_of_their_paths_and_links_once(tmp_path: Pa
     assert [Path(log) for log in found.logs] == [path for path in expected if path != linked]
 
 
+@pytest.mark.parametrize("name", ["_trials (1).csv", "_trials - Copy.csv", "_trials.CSV", "_ratings_old.csv"])
+def test_a_log_with_the_name_of_a_copy_is_named_and_not_read(name: str, tmp_path: Path) -> None:
+    write_study(tmp_path / "a", participants=2)
+    before = find_logs([tmp_path])
+    assert before.problems == ()
+    there = trials_path(tmp_path / "a", "P02")
+    there.rename(there.with_name(f"sub-P02_task-direction{name}"))
+    found = find_logs([tmp_path])
+    (said,) = found.problems
+    assert said.participant == "P02"
+    assert "that of a copy (rule: sub-CODE_task-EXPERIMENT_trials.csv" in said.message
+    assert len(found.logs) == len(before.logs) - 1
+
+
+def test_what_was_set_aside_or_practised_is_no_copy(tmp_path: Path) -> None:
+    write_study(tmp_path / "a", participants=1)
+    for name in ("_trials.aside-1.csv", "_practice_trials (1).csv", "_shots.csv"):
+        (tmp_path / "a" / "sub-P01" / f"sub-P01_task-direction{name}").write_text("x")
+    assert find_logs([tmp_path]).problems == ()
+
+
 def test_a_participant_whose_folder_is_a_link_is_named_and_not_read(tmp_path: Path) -> None:
     write_study(tmp_path / "a", participants=1)
     (tmp_path / "a" / "sub-P07").symlink_to(tmp_path / "a" / "sub-P01")

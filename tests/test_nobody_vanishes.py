@@ -40,6 +40,27 @@ def ran(folder: Path, code: str = "P01", config: str = "preference", **how: obje
     run(asked, synthetic_screen, LaterClock())
 
 
+@pytest.mark.parametrize("experiment", ["direction", "realism"])
+def test_a_gun_that_was_changed_within_a_study_is_told(
+    experiment: str, quick_configs: Path, recoil: Recoil, tmp_path: Path
+) -> None:
+    config = quick_configs / f"{experiment}.toml"
+    for code in ("P01", "P02", "P03"):
+        ran(tmp_path / "results", code, str(config))
+    assert [one for one in read_logs([tmp_path / "results"]).remarks if "setups" in one.message] == []
+    gun = quick_configs / "gun.toml"
+    gun.write_text(gun.read_text().replace("voltage_V = 16.0", "voltage_V = 12.0"))
+    ran(tmp_path / "results", "P04", str(config))
+    (told,) = (one for one in read_logs([tmp_path / "results"]).remarks if "setups" in one.message)
+    assert (
+        f"4 runs of {experiment} were made with 2 setups (config and gun) and count together: P01, P02, P03 with one, "
+        "P04 with gun voice_coil.voltage_V = 12.0, not 16.0;" in told.message
+    )
+    done = recoil("analyze", "results", "--out", "out")
+    assert (done.returncode, "were made with 2 setups" in done.stderr) == (1, True)
+    assert "were made with 2 setups" in (tmp_path / "out" / "report.md").read_text()
+
+
 def broken_off(folder: Path, code: str, records: int) -> Path:
     """A run that has begun: the head and so many records more of a finished one, and no table."""
     ran(folder, code)

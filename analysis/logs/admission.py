@@ -19,9 +19,10 @@ from analysis.logs.files import (
     results_above,
     seen_from,
 )
-from analysis.logs.journals import RunFile
+from analysis.logs.journals import Beside, RunFile
 from analysis.logs.kinds import IN_REGISTER, kept_out, kinds_of
 from analysis.logs.rules import Log
+from analysis.logs.setups import SetupOfLog, changed_setups
 from analysis.logs.suspicions import copies, other_log
 from analysis.logs.texts import Block
 from experiments.record.tables import DataKind
@@ -55,8 +56,8 @@ class Batch:
     logs: dict[int, Log | BadLogError] = field(default_factory=dict)
     mapped: dict[int, MappedLog] = field(default_factory=dict)
     """Logs of other programs."""
-    journals: dict[int, str | None] = field(default_factory=dict)
-    """Of logs of our own what there is to say of their journals, `None` where there is none."""
+    journals: dict[int, Beside | None] = field(default_factory=dict)
+    """The journals of logs of our own, `None` where there is none."""
     kinds: dict[int, DataKind | None] = field(default_factory=dict)
     """Whose data each good log holds; None where nobody answered."""
     told: dict[str, list[ToldRows]] = field(default_factory=dict)
@@ -103,6 +104,8 @@ class LogsSoFar:
     remarks: list[Problem] = field(default_factory=list)
     proven: dict[int, tuple[str, str, bool]] = field(default_factory=dict)
     """Folder and code of each good log of our own, and whether it has a journal."""
+    setups: dict[int, str] = field(default_factory=dict)
+    """The hash of the setup of each good log that has a journal."""
     told: dict[str, list[ToldRows]] = field(default_factory=dict)
     """What the rows of logs tell, by experiment."""
 
@@ -137,11 +140,27 @@ class LogsSoFar:
         if said:
             self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
-    def note(self, number: int, one: WaitingFile, log: Log, said: str | None) -> None:
-        """What there is to say of the journal of a log that was admitted."""
-        self.proven[number] = one.study, log.code, said is not None
-        if said:
-            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
+    def note(self, number: int, one: WaitingFile, log: Log, beside: Beside | None) -> None:
+        """The journal of a log that was admitted: whether there is one, its setup, and what there is to say of it."""
+        self.proven[number] = one.study, log.code, beside is not None
+        if beside is not None:
+            self.setups[number] = beside.setup
+            if beside.said:
+                self.remarks.append(BadLogError(beside.said).of(one.file, log.code, log.experiment, one.study))
+
+    def changed_setups(self) -> list[Problem]:
+        """Which logs that count together were made with several setups, and what differs."""
+        return changed_setups(
+            SetupOfLog(
+                study=study,
+                experiment=self.experiments[number],
+                code=self.codes[number],
+                path=self.paths[number // LOGS_A_FILE],
+                setup=self.setups.get(number, ""),
+            )
+            for number, study in self.studies.items()
+            if number // LOGS_A_FILE in self.paths
+        )
 
     def admit(self, number: int, one: WaitingFile, log: Log, study: str) -> None:
         """Take a participant's log of an experiment. `BadLogError`: they are excluded, or have one already."""

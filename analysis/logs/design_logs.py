@@ -39,13 +39,14 @@ class DesignLogs:
 class DesignLog:
     """One log that keeps every rule; `key` is the same for logs that can be analysed together.
 
-    `journal` is what there is to say of the journal beside it.
+    `journal` is what there is to say of the journal beside it, `setup` the hash of its setup.
     """
 
     code: str
     design: DesignConfig
     key: str
     journal: str
+    setup: str
     rows: tuple[Mapping[str, object], ...]
     gun_labels: Mapping[str, str]
 
@@ -67,7 +68,15 @@ def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
     _check_times(design, rows)
     _check_onsets(rows)
     said = compared_with(data, path, content)
-    return DesignLog(code=code, design=design, key=_key(design), rows=rows, journal=said, gun_labels=gun_labels(head))
+    return DesignLog(
+        code=code,
+        design=design,
+        key=_key(design),
+        rows=rows,
+        journal=said,
+        setup=head.setup_sha256,
+        gun_labels=gun_labels(head),
+    )
 
 
 def _design_of(path: str) -> tuple[bytes, DesignConfig, Head]:

@@ -39,6 +39,11 @@ class BadLogError(RecoilError):
 
 
 _NO_FILE = "a link that leads to no file; fetch what it stands for (`git annex get`, `datalad get`), or delete it"
+_LIKE_A_LOG = re.compile(r"sub-[^_]+_task-[^_]+_(trials|ratings)(?!\.aside-[0-9]+\.[a-z]+$).*\.csv", re.IGNORECASE)
+_RENAMED = (
+    "not read for its name, which is that of a copy (rule: sub-CODE_task-EXPERIMENT_trials.csv or _ratings.csv, and "
+    "_journal.jsonl beside it); if it is somebody's only log, give it that name, else delete it"
+)
 _LINKED = "a link to a folder, and linked folders are not read, so nobody is read twice; put the folder itself here"
 
 
@@ -220,6 +225,8 @@ def _why_not_read(entry: os.DirEntry[str], endings: tuple[str, ...]) -> str:
     """Why a link that looks like a log or a participant's folder is not read; empty if nothing is wrong."""
     if entry.name.endswith(endings):
         return "" if entry.is_file() else _NO_FILE if entry.is_symlink() else storage.NO_FILE
+    if _LIKE_A_LOG.fullmatch(entry.name) and _is_counted(entry.name):
+        return _RENAMED
     return _LINKED if entry.name.startswith("sub-") and entry.is_dir() else ""
 
 

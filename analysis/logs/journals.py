@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.words import first_few, how_many
@@ -105,22 +106,36 @@ def _refuse_other(run: RunFile, contents: Contents) -> None:
         raise JournalError(said)
 
 
-def compared(path: str, content: bytes) -> str | None:
-    """What there is to say of the journal of a table; empty if all is well, `None` if there is no journal.
+class Beside(NamedTuple):
+    """The journal beside a table: what there is to say of it, empty if all is well, and the hash of its setup."""
 
-    `BadLogError`: the table is not what the journal says.
-    """
+    said: str
+    setup: str
+
+
+def compared(path: str, content: bytes) -> Beside | None:
+    """The journal of a table; `None` if there is none. `BadLogError`: the table is not what the journal says."""
     where = journal_of(path)
     if not os.access(where, os.F_OK):  # of many thousands, much quicker than an exception
         return None
     try:
-        return compared_with(storage.read_whole(where), path, content)
+        data = storage.read_whole(where)
     except OSError as error:
-        return f"its journal cannot be read ({error.strerror}), so nothing proves the table"
+        return Beside(f"its journal cannot be read ({error.strerror}), so nothing proves the table", "")
+    return Beside(compared_with(data, path, content), setup_in(data))
+
+
+_SETUP = re.compile(rb'"setup_sha256":"([0-9a-f]{64})"')
+
+
+def setup_in(data: bytes) -> str:
+    """The hash of the setup in the first line of a journal; empty if there is none."""
+    found = _SETUP.search(data, 0, data.find(b"\n"))
+    return found[1].decode() if found else ""
 
 
 def compared_with(data: bytes, path: str, content: bytes) -> str:
-    """As `compared`, where the bytes of the journal are at hand."""
+    """What there is to say of a journal, by its bytes; empty if all is well. Raises as `compared`."""
     where = journal_of(path)
     if where == path:
         return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"

@@ -32,7 +32,17 @@ from analysis.logs.files import (
     read_content,
     study_names,
 )
-from analysis.logs.journals import BegunRun, RunFile, all_gone, compared, gone, made_again, run_file, without_table
+from analysis.logs.journals import (
+    BegunRun,
+    Beside,
+    RunFile,
+    all_gone,
+    compared,
+    gone,
+    made_again,
+    run_file,
+    without_table,
+)
 from analysis.logs.kinds import begun_by_kind, kind_of_design, kinds_there
 from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
@@ -144,7 +154,7 @@ def read_logs(
     return replace(
         first,
         problems=tuple(sorted(reading.problems, key=_by_place)),
-        remarks=(*reading.remarks, *turned_round(first.trials, first.paths)),
+        remarks=(*reading.remarks, *reading.changed_setups(), *turned_round(first.trials, first.paths)),
         notes=tuple(all_gone(reading.proven.values())),
         begun=tuple(begun_of[kinds[0]]),
         runs=tuple(runs_of[kinds[0]]),
@@ -214,7 +224,7 @@ def _designed(
             of_design = Log(code=log.code, experiment=log.design.design)
             reading.kinds[number * LOGS_A_FILE] = kind_of_design(log)
             reading.admit(number * LOGS_A_FILE, waiting, of_design, study)
-            reading.note(number * LOGS_A_FILE, waiting, of_design, log.journal)
+            reading.note(number * LOGS_A_FILE, waiting, of_design, Beside(log.journal, log.setup))
             reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
             logs[number * LOGS_A_FILE] = log
             if told := told_by_design(number * LOGS_A_FILE, log.design, log.rows):

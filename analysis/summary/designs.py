@@ -117,8 +117,9 @@ def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> Que
     column = correct_columns(design.questions).get(name, name)
     scored = table.assign(score=answer_scores(design.questions[name], table[column])).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
-    people, left_out = _complete(real, varied(design))
-    return QuestionScores(scored=scored, real=real, people=people, left_out=left_out)
+    people = _complete(real, varied(design))
+    left_out = sorted({*table["participant_id"].astype(str)} - {*people.index.astype(str)})
+    return QuestionScores(scored=scored, real=real, people=people, left_out=tuple(left_out))
 
 
 def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
@@ -136,7 +137,13 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         preferred=_preferred(design, name, question, scored),
         scale=_scale(question),
         held=_is_held(design, question),
+        not_above_0=_not_above_0(question, table[name]),
     )
+
+
+def _not_above_0(question: QuestionConfig, column: pd.Series) -> int | None:
+    """How many numbers have no logarithm, and so no score; `None` without any."""
+    return int((pd.to_numeric(column) <= 0).sum()) or None if question.kind == "number" else None
 
 
 def _is_held(design: DesignConfig, question: QuestionConfig) -> bool:
@@ -260,14 +267,12 @@ def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.Da
     return replace(described, right=right, p=float(test.p), ci_low=float(test.ci_low), ci_high=float(test.ci_high))
 
 
-def _complete(rows: pd.DataFrame, factors: Sequence[str]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Every person's mean score by condition, one row a person; and who lacks one."""
+def _complete(rows: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
+    """The mean score by condition, one row for each person who has all of them."""
     within = [name for name in factors if rows.groupby("participant_id")[name].nunique().max() > 1]
     if not within:
-        return rows.groupby("participant_id")[["score"]].mean(), ()
-    wide = rows.pivot_table(index="participant_id", columns=within, values="score")
-    lacking = wide.index[wide.isna().any(axis=1)]
-    return wide.drop(index=lacking), tuple(map(str, lacking))
+        return rows.groupby("participant_id")[["score"]].mean()
+    return rows.pivot_table(index="participant_id", columns=within, values="score").dropna()
 
 
 def _groups(design: DesignConfig, rows: pd.DataFrame) -> pd.Series | None:
@@ -289,7 +294,7 @@ def _comparisons(
     if why := _untested(design, question, people):
         yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
         return
-    if question.kind == "number" and len(names) == 1:
+    if question.kind == "number" and len(names) == 1 and pd.api.types.is_numeric_dtype(people.columns.dtype):
         yield from _exponent(names[0], people)
     if len(names) == 1 and (group is None or question.kind == "ranking"):
         scores = people.to_numpy(dtype=np.float64)

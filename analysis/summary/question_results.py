@@ -57,7 +57,8 @@ class QuestionSummary:
     `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
     level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean. `thresholds`: the
     psychometric functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
-    `held`: its share of successes is where a procedure held it, which chose the levels by the answers.
+    `held`: its share of successes is where a procedure held it, which chose the levels by the answers. `not_above_0`:
+    how many numbers have no logarithm, and so stand in no mean; `None` without any.
     """
 
     kind: str
@@ -70,6 +71,12 @@ class QuestionSummary:
     thresholds: Thresholds | None = field(default=None, metadata=OPTIONAL)
     pairs: PairedComparison | None = field(default=None, metadata=OPTIONAL)
     held: bool = field(default=False, metadata=UNWRITTEN)
+    not_above_0: int | None = field(default=None, metadata=OPTIONAL)
+
+    @property
+    def lacked(self) -> str:
+        """What somebody lacked in a condition who is in no test."""
+        return "number above 0" if self.kind == "number" else "answer"
 
     @property
     def drawn(self) -> bool:

@@ -132,17 +132,18 @@ _NAMED = 20
 
 def _lacking(name: str, design: results.DesignSummary) -> Iterator[LeftOut]:
     """Who is in no test of some questions of a design."""
-    lacking: dict[str, list[str]] = {}
+    lacking: dict[str, dict[str, list[str]]] = {}
     for question, found in design.questions.items():
         for who in found.left_out:
-            lacking.setdefault(who, []).append(question)
-    for who, questions in lacking.items():
+            lacking.setdefault(who, {}).setdefault(found.lacked, []).append(question)
+    for who, kinds in lacking.items():
+        answers = " and ".join(f"no {answer} to {', '.join(questions)}" for answer, questions in kinds.items())
         yield LeftOut(
             experiment=name,
             participant=who,
-            reason=f"no answer to {', '.join(questions)} in some condition",
+            reason=f"{answers} in some condition",
             rule=IN_NO_TEST,
-            remedy="none here; means, counts and the other questions count them",
+            remedy="none here; means, counts and other questions hold what they answered",
         )
 
 

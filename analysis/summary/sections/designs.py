@@ -201,13 +201,15 @@ def _words(found: DesignSummary) -> Iterator[str]:
         yield f"{name}: {how_many(said, 'answer')} in words; they stand in the logs."
 
 
-def lacking_conditions(found: DesignSummary) -> tuple[str, ...]:
-    """Who is in no test of a question, and why."""
-    return tuple(
-        f"In no test of {asked}, as a condition is missing: {', '.join(question.left_out)}."
-        for asked, question in found.questions.items()
-        if question.left_out
-    )
+def lacking_conditions(found: DesignSummary) -> Iterator[str]:
+    """Who is in no test of a question, and which answers are in no mean; and why."""
+    for asked, question in found.questions.items():
+        if question.left_out:
+            people = ", ".join(question.left_out)
+            yield f"In no test of {asked}, with no {question.lacked} in some condition: {people}."
+        if question.not_above_0:
+            numbers = how_many(question.not_above_0, "number")
+            yield f"In no mean and no test of {asked}: {numbers} of 0 or less, which have no logarithm."
 
 
 def _picture(name: str, found: DesignSummary) -> Picture:

@@ -149,7 +149,8 @@ def _of_design(report: ReportData, name: str, found: DesignSummary) -> Iterator[
     people = _people(report, name, how_many(found.n, f"{synthetic}participant"), analysed)
     yield f"{found.title}, participants and design. {people} {' '.join(found.protocol)}"
     lacking = (
-        f"{how_many(len(question.left_out), 'participant')} lacked a condition of {asked} and stood in no test of it."
+        f"{how_many(len(question.left_out), 'participant')} gave no {question.lacked} to {asked} in some condition, "
+        "and stood in no test of it."
         for asked, question in found.questions.items()
         if question.left_out
     )

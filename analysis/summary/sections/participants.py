@@ -158,8 +158,14 @@ def left_out_lines(report: ReportData) -> tuple[str, ...]:
     return (
         *(_rule_line(report, [*some]) for _, some in groupby(sorted(people, key=_rule), key=_rule)),
         *(f"Left out: {told(problem)}." for problem in report.problems),
-        *(f"Used, but: {told(remark)}." for remark in report.remarks),
+        *(f"{'Used, but' if _is_used(report, remark) else 'Also'}: {told(remark)}." for remark in report.remarks),
     )
+
+
+def _is_used(report: ReportData, remark: Problem) -> bool:
+    """Whether what there is to say is of logs that count: of whoever is left out, the reason stands above."""
+    analysed = report.analysed.get(remark.experiment, ())
+    return not remark.participant or any(code.rpartition("/")[2] == remark.participant for code in analysed)
 
 
 def _rule(entry: LeftOut) -> tuple[str, str, str]:

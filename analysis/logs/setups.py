@@ -1,0 +1,73 @@
+"""Runs of one experiment that were made with several setups: configs or guns that were changed meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.logs.files import Problem
+from analysis.logs.journals import journal_of
+from device.words import first_few, how_many
+from experiments.record import journal
+from experiments.record.journal import JournalError
+from experiments.study.preregistration import Files, changed_keys, plain_value
+
+_NAMED = 20
+"""So many people, and so many keys, are named."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetupOfLog:
+    """With which setup a log was made: the study's folder, experiment, code, the log's path, and the setup's hash."""
+
+    study: str
+    experiment: str
+    code: str
+    path: str
+    setup: str
+
+
+def changed_setups(logs: Iterable[SetupOfLog]) -> list[Problem]:
+    """Of each study's experiment whose logs were made with several setups: whose, and what differs between them."""
+    groups: dict[tuple[str, str], dict[str, list[SetupOfLog]]] = {}
+    for log in logs:
+        if log.setup:
+            groups.setdefault((log.study, log.experiment), {}).setdefault(log.setup, []).append(log)
+    return [_told(setups) for setups in groups.values() if len(setups) > 1]
+
+
+def _told(setups: Mapping[str, list[SetupOfLog]]) -> Problem:
+    """The setup of most logs, and how each other one differs from it."""
+    first, *others = sorted(setups.values(), key=len, reverse=True)
+    one, count = first[0], sum(map(len, setups.values()))
+    differing = "; ".join(f"{_people(some)} with {_differences(one, some[0])}" for some in others)
+    message = (
+        f"{how_many(count, 'run')} of {one.experiment} were made with {len(setups)} setups (config and gun) and count "
+        f"together: {_people(first)} with one, {differing}; if that matters, analyse them apart: name their folders in "
+        "a call of its own"
+    )
+    return Problem(file=Path(one.study), line=None, column=None, message=message, experiment=one.experiment)
+
+
+def _people(logs: Sequence[SetupOfLog]) -> str:
+    return first_few([log.code for log in logs], _NAMED)
+
+
+def _differences(first: SetupOfLog, other: SetupOfLog) -> str:
+    """The keys that differ between the setups of two logs, each with both values."""
+    with suppress(JournalError):
+        before, after = _setup(first), _setup(other)
+        changes = [
+            f"{file} {change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
+            for file in ("experiment", "gun")
+            for change in changed_keys(file, before.get(file, {}), after.get(file, {}))
+        ]
+        return first_few(changes, _NAMED)
+    return "another setup"
+
+
+def _setup(log: SetupOfLog) -> Files:
+    head = journal.head(Path(journal_of(log.path)))
+    return head.setup_json if head is not None and isinstance(head.setup_json, dict) else {}
