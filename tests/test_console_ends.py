@@ -28,6 +28,7 @@ from tests.at_display import (
 from tests.at_hand import check_gun
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows
 from tests.conftest import RECOIL
+from tests.waiting import wait_for
 from tests.watched_console import Look, Watch
 
 pytest.importorskip("PyQt6")
@@ -274,6 +275,35 @@ def test_a_gun_that_went_silent_before_the_emergency_stop_is_never_shown_as_disa
             code, said = screen.close()
     assert code == 130, said
     assert "stopped: emergency stop" in said
+
+
+def test_a_gun_that_does_not_answer_is_not_fired_and_once_it_answers_it_is(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    def shots() -> int:
+        return sum(record["kind"] == "shot" for record in records(tmp_path / f"{PREFERENCE}_journal.jsonl"))
+
+    with (
+        twin_process() as (address, twin),
+        AtConsole(run_words(quick_configs, "preference", "--gun", address), tmp_path, display) as screen,
+    ):
+        screen.stands(RUN)
+        screen.to("preparing", trial=1)
+        twin.send_signal(signal.SIGSTOP)
+        look = screen.until(lambda look: look.says("See to the gun first"))
+        assert not look.says("Fire\n[Space]")
+        screen.keys.press("space")
+        twin.send_signal(signal.SIGCONT)
+        screen.until(lambda look: look.says("hand it over") and look.state == "preparing")
+        assert remarks(tmp_path / f"{PREFERENCE}_journal.jsonl", "refused")[-1]["event"] == "fire"
+        assert shots() == 0
+        screen.keys.press("space")
+        screen.at("train")
+        wait_for(lambda: shots() > 0)
+        screen.keys.press("F12")
+        screen.until(lambda look: look.says("The gun itself says that it is disarmed."))
+        screen.keys.press("q")
+        assert screen.close()[0] == 130
 
 
 def test_what_is_half_typed_is_kept_as_a_note_when_another_command_comes_and_q_closes_the_window(

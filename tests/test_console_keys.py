@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.design.language import QuestionConfig
 from experiments.design.plan import Trial, condition
 from experiments.screens.console.keys import (
     ANSWERS,
@@ -18,6 +19,7 @@ from experiments.screens.console.keys import (
     Name,
     Presses,
     Typing,
+    choices_at,
     command_for,
     field_at,
     shown_key,
@@ -26,6 +28,7 @@ from experiments.screens.console.keys import (
 from experiments.session import events
 from experiments.session.states import TABLE, No, Position, State
 from experiments.session.steps import Asking, what
+from experiments.tasks.questions import choices
 from tests.asked import WAYS, ask, describe, rate
 
 S = State
@@ -83,6 +86,23 @@ def test_where_nothing_is_typed_a_letter_is_a_command_and_with_ctrl_as_well_but_
     ]
     for key in LETTERS:
         assert command(key, position, ctrl=True) == (None if key in "FB" else command(key, position))
+
+
+@pytest.mark.parametrize("position", NO_FIELD, ids=lambda position: position.state)
+def test_a_letter_of_answer_and_command_is_the_command_but_for_where_it_is_asked_for(position: Position) -> None:
+    asked = choices(QuestionConfig(kind="choice", text="?", answers=("note", "pleasant", "much", "young")))
+    assert [one.key for one in asked] == ["n", "p", "m", "y"]
+    found = [
+        command_for(key, ctrl=False, typing=NOTHING, position=position, choices=asked) for key in ("N", "P", "M", "Y")
+    ]
+    answers = ["answer 1", "answer 2", "answer 3", "answer 4"]
+    pause = "go on" if position.state is S.PAUSED else "pause"
+    if choices_at(position):
+        assert found == answers
+    elif position.state in (S.FIRING, S.SAVING):  # too soon, or twice; the gun can be held all the same
+        assert found == [answers[0], pause, *answers[2:]]
+    else:
+        assert found == ["note", pause, "damper", "reason"]
 
 
 @pytest.mark.parametrize("line", [False, True])

@@ -168,6 +168,16 @@ def test_what_stops_or_holds_is_not_guarded(event: Event, tmp_path: Path) -> Non
         assert sitting.live.offer(event, Press(at_s=0.0, serial=-1))
 
 
+def test_a_gun_in_trouble_is_not_fired_until_it_is_seen_to(tmp_path: Path) -> None:
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        sitting.live.gun_fault = "the gun is not there."
+        refused = by_hand(sitting, events.Fire())
+        assert refused == EventVerdict(taken=False, text="See to the gun first: the gun is not there.")
+        assert sitting.position.state is S.PREPARING
+        sitting.live.gun_fault = ""
+        assert by_hand(sitting, events.Fire())
+
+
 def test_next_is_taken_from_the_least_exposure_on_and_not_before_the_first_shot(tmp_path: Path) -> None:
     with sat(PREFERENCE, tmp_path) as sitting:
         sitting.to(S.PREPARING)

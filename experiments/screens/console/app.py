@@ -13,7 +13,7 @@ from typing import Any
 from PyQt6.QtCore import QEventLoop, QObject, Qt, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
-from device import DeviceError, Gun, GunStatus
+from device import DeviceError, GunStatus
 from device.words import RecoilError
 from experiments.clock import Clock
 from experiments.config.setup import Setup
@@ -228,14 +228,16 @@ class Console:
         self._opened.wait()
         return self
 
-    def _look_at(self, gun: Gun) -> None:
-        """Look at the gun until the run ends."""
+    def _look_at(self, live: LiveRun) -> None:
+        """Look at the gun until the run ends: a gun in trouble is not fired."""
         while not self._over.is_set():
             asked_s = self.clock.now()
             try:
-                self._tell(view.GunSeen(status=gun.status(), asked_s=asked_s))
+                seen = view.GunSeen(status=live.gun.status(), asked_s=asked_s)
             except DeviceError as error:
-                self._tell(view.GunSeen(status=None, asked_s=asked_s, fault=str(error)))
+                seen = view.GunSeen(status=None, asked_s=asked_s, fault=str(error))
+            live.gun_fault = seen.trouble
+            self._tell(seen)
             self._over.wait(GUN_LOOK_S)
 
     # the screen that the run knows
@@ -250,7 +252,7 @@ class Console:
             noise = self.participant.begin(live, self._tell)
             if noise:
                 live.remark(Noted(trial=None, text=noise))
-        threading.Thread(target=self._look_at, args=(live.gun,), daemon=True, name="gun-look").start()
+        threading.Thread(target=self._look_at, args=(live,), daemon=True, name="gun-look").start()
 
     def show(self, position: Position) -> None:
         """Have a position shown, on the participant's screen as well."""

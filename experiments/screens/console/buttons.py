@@ -159,7 +159,8 @@ class Buttons:
         shown = set[str]() if over else set(_shown(position, screen_lost=not idle("restart")))
         choices = () if over else choices_at(position)
         asks = bool(choices) and position.state in (State.ASKING, State.CORRECTING)
-        large: set[QtWidgets.QWidget] = {button for name, button in self._large.items() if name in shown}
+        hidden = {"fire"} if idle("fire") else set[str]()  # nobody is shown to fire a gun in trouble
+        large: set[QtWidgets.QWidget] = {button for name, button in self._large.items() if name in shown - hidden}
         self.slots.show_only(large | set(self._answers if asks else ()))
         half = (len(choices) + 1) // 2
         if asks:

@@ -127,7 +127,7 @@ class Controls:
 
     @property
     def choices(self) -> tuple[Choice, ...]:
-        """The answers whose keys count now."""
+        """The answers that are asked for, else those of which it is told that they come too soon."""
         return keys.choices_at(self.drawn) or self._choices
 
     def command(self, key: str, *, ctrl: bool) -> keys.Name | None:
@@ -257,6 +257,8 @@ class Controls:
     def _nothing_to(self, name: keys.Name) -> str:
         if name == "repeat" and self._live.moment.repeatable is None:
             return phrase("There is no trial of this set to repeat now.")
+        if name == "fire" and self._live.gun_fault:
+            return phrase("See to the gun first.")
         if name == "undo" and self._live.moment.further_back is None:
             return phrase("There is nothing to undo in this set.")
         return ""
@@ -441,7 +443,8 @@ class Controls:
 
     def _help_line(self, name: keys.Name) -> str:
         not_now = self.idle(name)
-        key = keys.shown_key(name, letters=self.typing.letters, choices=self.choices)
+        choices = self.choices if name in keys.ANSWERS else keys.choices_at(self.drawn)
+        key = keys.shown_key(name, letters=self.typing.letters, choices=choices)
         does = keys.BY_NAME[name].does
         if name in keys.ANSWERS:
             does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].told)

@@ -34,18 +34,10 @@ def instruction(seen: Seen) -> Instruction:
     """What to do now."""
     if seen.ended is not None:
         return _end(seen.about, seen.ended)
-    if seen.position.state in (State.SETTING, State.PREPARING) and (trouble := gun_trouble(seen)):
+    if seen.position.state in (State.SETTING, State.PREPARING) and (trouble := seen.gun_trouble):
         return _see_to_the_gun(trouble)
     shown = _OF_STATE.get(seen.position.state, _MOMENT)
     return shown if isinstance(shown, Instruction) else shown(seen)
-
-
-def gun_trouble(seen: Seen) -> str:
-    """Why the gun is not to be handed over: it has a fault, or does not answer; empty if neither is so."""
-    if seen.gun is None:
-        return ""
-    status = seen.gun.status
-    return seen.gun.fault if status is None else status.fault or ""
 
 
 def _see_to_the_gun(trouble: str) -> Instruction:

@@ -185,7 +185,9 @@ class Typing:
 
 
 def choices_at(position: Position) -> tuple[Choice, ...]:
-    """The answers that are asked for, or that an open correction chooses among; none if nothing is to be chosen."""
+    """The answers that are asked for now, or that an open correction chooses among; none if nothing is to be chosen."""
+    if position.state not in (State.ASKING, State.CORRECTING):
+        return ()
     asked = position.correcting or position.step
     return asked.choices if isinstance(asked, Ask) else ()
 
@@ -194,7 +196,7 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position, cho
     """The command that a key is now; `None` if it is none, and so may be text. `choices` have keys of their own.
 
     Where letters are text, a letter is a command with Ctrl held; elsewhere Ctrl changes nothing, but answers take none:
-    a command whose letter is an answer's is done with Ctrl.
+    a command whose letter is an answer's is done with Ctrl as long as the question stands there.
     """
     if key in _ALWAYS:
         return _ALWAYS[key]
@@ -205,9 +207,18 @@ def command_for(key: str, *, ctrl: bool, typing: Typing, position: Position, cho
     if typing.letters and not ctrl:
         return None
     answers = [one.key.upper() for one in choices]
-    if key in answers and not ctrl:
+    if key in answers and not ctrl and (choices_at(position) or _comes_too_soon(key, position)):
         return ANSWERS[answers.index(key)]
     return _letter(key, position)
+
+
+def _comes_too_soon(key: str, position: Position) -> bool:
+    """Whether the letter of an answer that is not asked for now is one all the same, and is told that it is too soon.
+
+    It is if no command has it. While a shot is fired, or an answer saved, a question is about to come or just gone:
+    there a letter is no command but Pause.
+    """
+    return _letter(key, position) is None or (position.state in (State.FIRING, State.SAVING) and key != "P")
 
 
 _ALWAYS: dict[str, Name] = {"F12": "emergency", "F1": "help", "F2": "theme", "Esc": "leave", "Enter": "enter"}

@@ -10,7 +10,6 @@ from device import GunStatus
 from experiments.design.plan import Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
-from experiments.screens.console.instructions import gun_trouble
 from experiments.screens.console.view import About, Seen
 from experiments.screens.phrases import phrase
 from experiments.session import steps
@@ -173,7 +172,7 @@ def gun_text(seen: Seen) -> tuple[str, str]:
         return phrase("Gun: not seen yet"), "wait"
     status: GunStatus | None = said.status
     if status is None or status.fault:
-        return phrase("Gun: FAULT – {fault}", fault=gun_trouble(seen)), "bad"
+        return phrase("Gun: FAULT – {fault}", fault=seen.gun_trouble), "bad"
     if seen.ended is not None and status.state != "disarmed":
         return phrase("Gun: not looked at any more"), "wait"
     if seen.ended is None and seen.now_s - said.asked_s > UNANSWERED_S:

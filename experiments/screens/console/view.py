@@ -60,6 +60,11 @@ class GunSeen(Message):
     asked_s: float
     fault: str = ""
 
+    @property
+    def trouble(self) -> str:
+        """Why the gun is not to be handed over: it has a fault, or does not answer; empty if neither is so."""
+        return self.fault if self.status is None else self.status.fault or ""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantSeen(Message):
@@ -132,6 +137,11 @@ class Seen:
     def key(self, name: Name) -> str:
         """The key of a command as it is now."""
         return shown_key(name, letters=self.letters, choices=choices_at(self.position))
+
+    @property
+    def gun_trouble(self) -> str:
+        """Why the gun is not to be handed over, as it was seen last; empty if nothing is wrong."""
+        return "" if self.gun is None else self.gun.trouble
 
     @property
     def participant_gone(self) -> bool:
