@@ -277,6 +277,23 @@ def test_a_gun_that_went_silent_before_the_emergency_stop_is_never_shown_as_disa
     assert "stopped: emergency stop" in said
 
 
+def test_a_practice_of_the_command_line_says_that_it_is_one_and_promises_no_resumption(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with AtConsole(run_words(quick_configs, "direction", "--practice"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("preparing")
+        screen.until(lambda look: look.says("PRACTICE – never analysed"))
+        screen.keys.press("q")
+        screen.until(lambda look: look.says("Why does it stop here? It is begun anew each time."))
+        screen.keys.type("enough")
+        screen.keys.press("Return")
+        look = screen.until(lambda look: look.ended)
+        assert not look.says("can be resumed")
+        code, said = screen.close()
+    assert (code, "A practice is begun anew each time" in said) == (130, True)
+
+
 def test_a_gun_that_does_not_answer_is_not_fired_and_once_it_answers_it_is(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

@@ -31,11 +31,13 @@ from experiments.session.duration import Ahead, RunTiming, clock_text, end_text,
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, Asking, Interrupted, Prepare, Present, Presented, Repeated, Rest
+from experiments.tasks.questions import choices_of
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
 from tests.designs import direction_with
 
 SAID = Answered(value="forward", by="experimenter", response_time_s=1.0, response_time_valid=False)
+RATED = replace(SAID, value=2.0)
 SHOWN = Presented(gun="simulated", onset_utc="", shots=3, exposure_s=2.0, ended_by="next")
 
 
@@ -70,6 +72,25 @@ def test_what_comes_next_leaves_out_tracks_that_have_ended() -> None:
     here = seen(setup, Position(step=ask(plan_of(setup).trials[0])))
     own = [one.direction.upper() for one in here.about.plan.trials[1:] if one.track == 1]
     assert progress.coming(replace(here, over=frozenset([2]))) == own[:3] != progress.coming(here)
+
+
+@pytest.mark.parametrize("answers", [("forward", "backward"), ("near", "rather far"), ("much stronger", "a bit", "no")])
+def test_answers_that_have_no_room_on_their_buttons_are_listed_with_their_keys(answers: tuple[str, ...]) -> None:
+    asked = choices_of({answer: answer for answer in answers}, {})
+    step = replace(ask(plan_of(DIRECTION).trials[0]), choices=asked)
+    shown = instruction(seen(DIRECTION, Position(states=(State.ASKING,), step=step))).detail
+    listed = [f"{one.key.upper()}  {one.told}" in shown for one in asked]
+    assert listed == [len(answers) > 2] * len(answers)
+
+
+def test_a_correction_names_its_question_where_several_of_its_kind_are_asked() -> None:
+    first = rate(plan_of(PREFERENCE).trials[0])
+    other = replace(first, question="realism")
+    corrected = Position(states=(State.RATING, State.CORRECTING), correcting=first)
+    assert instruction(seen(PREFERENCE, corrected, (first, RATED))).title == "Correct the rating"
+    told = ((first, RATED), (other, RATED))
+    assert instruction(seen(PREFERENCE, corrected, *told)).title == "Correct the rating “rating”"
+    assert instruction(seen(PREFERENCE, replace(corrected, correcting=other), *told)).title.endswith("“realism”")
 
 
 # what is never told

@@ -70,6 +70,7 @@ class TerminalScreen:
         """Say who it is, and begin to read."""
         self._live = live
         band = "SIMULATED GUN – nothing is felt.\n" if is_simulated(live.gun_name) else ""
+        band += "PRACTICE – never analysed.\n" if self._plan.practice else ""
         self._say(f"{band}Participant {self._plan.participant_id}, experiment {self._plan.experiment}.\n{_HELP}")
         for target in (self._read, self._count_down):
             threading.Thread(target=target, daemon=True, name="terminal").start()

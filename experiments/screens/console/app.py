@@ -167,6 +167,7 @@ class Console:
             hand=self._hand,
             participant=self.participant,
             observer=self.observer,
+            kept=not window.about.band,
         )
 
     def _leave(self, reason: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from textwrap import shorten
 from typing import Protocol
 
 from PyQt6 import QtWidgets
@@ -11,7 +10,7 @@ from PyQt6.QtCore import Qt
 from PyQt6.QtGui import QMouseEvent
 
 from experiments.screens.console import widgets
-from experiments.screens.console.keys import ANSWERS, BY_NAME, Name, choices_at, field_at, shown_key
+from experiments.screens.console.keys import ANSWERS, BY_NAME, Name, button_lines, choices_at, field_at, shown_key
 from experiments.screens.phrases import phrase
 from experiments.session.events import Press
 from experiments.session.states import Position, State
@@ -58,7 +57,8 @@ class CommandButton(QtWidgets.QPushButton):
 
     def label(self, text: str = "", *, letters: bool = False, choices: Sequence[Choice] = ()) -> None:
         """Show what it does, and its key below."""
-        shown = f"{text or BY_NAME[self.name].text}\n[{shown_key(self.name, letters=letters, choices=choices)}]"
+        key = shown_key(self.name, letters=letters, choices=choices)
+        shown = "\n".join(filter(None, (text or BY_NAME[self.name].text, f"[{key}]")))
         if shown != self.text():
             self.setText(shown)
 
@@ -111,14 +111,11 @@ class AnswerButtons(QtWidgets.QWidget):
         for place, button in enumerate(self._buttons):
             button.setVisible(place in shown)
             if place in shown:
-                label = shorten(choices[place].told.upper(), MAX_LABEL // len(shown), placeholder="…")
-                button.label(label, choices=choices)
+                button.label(button_lines(choices[place].told, len(shown)), choices=choices)
                 button.setAccessibleName(choices[place].told)
                 button.setToolTip(choices[place].told)
 
 
-MAX_LABEL = 24
-"""So many letters have room on a large button."""
 _LEFT: tuple[Name, ...] = ("damper", "restart")
 _MIDDLE: tuple[Name, ...] = ("fire", "next", "go on", "enter", "rearm", "reason")
 _RIGHT: tuple[Name, ...] = ("end break", "no answer")

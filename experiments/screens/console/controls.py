@@ -82,7 +82,7 @@ class Controls:
 
     `choices` are the answers whose keys are known before any is asked for: what comes too soon is told so.
 
-    `drawn` is the position on the screen: a press counts for it.
+    `drawn` is the position on the screen: a press counts for it. `kept`: the run is no practice and no training.
     """
 
     def __init__(
@@ -95,10 +95,11 @@ class Controls:
         hand: Hand = "experimenter",
         participant: ParticipantSide | None = None,
         observer: Any = None,
+        kept: bool = True,
     ) -> None:
         self._live, self._clock, self._view = live, clock, view
         self._choices, self._hand, self._participant = choices, hand, participant
-        self._observer = observer
+        self._observer, self._kept = observer, kept
         self._open: tuple[keys.Name, Trial] | None = None
         self._held: Press | None = None
         self.drawn = live.position
@@ -356,9 +357,8 @@ class Controls:
             moment = self._live.moment
             trial = (moment.repeatable if name == "repeat" else None) or moment.trial
             self._open = name, trial
-            self._view.open_line(
-                phrase("{question}  (Enter saves, Esc leaves it)", question=line_question(name, trial, self._live))
-            )
+            question = line_question(name, trial, self._live, kept=self._kept)
+            self._view.open_line(phrase("{question}  (Enter saves, Esc leaves it)", question=question))
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to close the window of a live run: a gun that may fire is disarmed first."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from experiments.live_run import HALT_UNSAVED
 from experiments.screens import texts
+from experiments.screens.console.keys import is_on_buttons
 from experiments.screens.console.view import About, Ended, Seen, method_text
 from experiments.screens.phrases import isolated, phrase
 from experiments.session.history import entered_value
@@ -131,7 +132,8 @@ def _asking(seen: Seen) -> Instruction:
         own_keys=own_keys,
         keys=_keys(step),
     )
-    told = phrase("Enter what the participant says: {keys}.", keys=_keys(step))
+    listed = "" if is_on_buttons(step.choices) else "".join(f"\n{one.key.upper()}  {one.told}" for one in step.choices)
+    told = phrase("Enter what the participant says: {keys}.", keys=_keys(step)) + listed
     there = _asked_there(seen, own, told) if seen.about.participant_keys else told
     about = _order_told(seen, step) if step.later else ""
     return Instruction(title=isolated(step.text), detail="\n".join(filter(None, (about, there))), mood="ask")
@@ -222,7 +224,7 @@ def _correcting(seen: Seen) -> Instruction:
     if entry is None:
         return _MOMENT
     return Instruction(
-        title=phrase("Correct the {what}", what=what(entry)),
+        title=phrase("Correct the {what}", what=texts.entry_name(seen.told, entry)),
         damper=texts.place_text(seen.about.plan, entry.trial),
         detail=phrase(
             "It was entered as {value}. {entered_how}\n{undo_key} goes further back, Esc leaves it.",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Literal, get_args
 
 from experiments.design.language import QuestionConfig
@@ -279,6 +280,29 @@ def shown_key(name: Name, *, letters: bool, choices: Sequence[Choice] = ()) -> s
     if letters and key == "Space":
         return phrase("Esc, then {key}", key=key)
     return phrase("Ctrl+{key}", key=key) if len(key) == 1 and (letters or key in answers) else key
+
+
+_BUTTON_LETTERS = 18
+"""So many letters have room side by side on the large buttons of one side."""
+
+
+def button_lines(told: str, beside: int) -> str:
+    r"""An answer as it stands on one of so many buttons side by side, in two lines at most; empty if it has no room.
+
+    >>> button_lines("forward", 1), button_lines("rather far", 2), button_lines("a little stronger", 2)
+    ('FORWARD', 'RATHER\nFAR', '')
+    """
+    room = _BUTTON_LETTERS // beside - 2 * (beside > 1)
+    lines = wrap(told.upper(), max(1, room), break_long_words=False)
+    return "\n".join(lines) if len(lines) <= 2 and max(map(len, lines), default=0) <= room else ""
+
+
+def is_on_buttons(choices: Sequence[Choice]) -> bool:
+    """Whether every answer stands whole on its button."""
+    beside = (len(choices) + 1) // 2
+    return all(
+        " ".join(button_lines(one.told, beside).split()) == " ".join(one.told.upper().split()) for one in choices
+    )
 
 
 def why_not(name: Name, position: Position) -> str:

@@ -42,28 +42,30 @@ from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 
-def run_live(request: RunRequest, *, band: str = "", last: str = THANK_PARTICIPANT) -> Finished:
+def run_live(request: RunRequest, *, last: str = THANK_PARTICIPANT) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
-    `band` and `last` as of a `Console`. `PlaceError` without a display, or if the participant's screen does not open.
+    `last`: the last sentence of a run that is kept. `PlaceError` without a display, or if the participant's screen does
+    not open.
     """
     application()
     try:
-        return _carry_out(request, band, last)
+        return _carry_out(request, last)
     except UnfinishedRun as found:
         decided = None if request.visual else ask_about(request, found)
         if decided is None:
             raise
-        return _carry_out(gone_on_with(decided), band, last)
+        return _carry_out(gone_on_with(decided), last)
 
 
-def _carry_out(request: RunRequest, band: str, last: str) -> Finished:
+def _carry_out(request: RunRequest, last: str) -> Finished:
     clock = RealClock()
     check_font(request)
     with ExitStack() as stack:
         rater = open_rater(stack) if request.visual and request.options.screen else None
         participant = _participant(stack, request) if request.options.any else None
-        console = Console(request, clock, participant=participant, band=band, last=last)
+        band, said_last = _band_and_last(request, last)
+        console = Console(request, clock, participant=participant, band=band, last=said_last)
         if request.visual:
             stack.enter_context(VisualParticipant(console, rater))
         return console.run()
@@ -108,15 +110,19 @@ def check_monitor(monitor: int | None) -> None:
         raise PlaceError(f"--participant-monitor {monitor}: there is no such screen; known are {'; '.join(known)}")
 
 
-def _band_and_last(study: StudyFolder, choice: RunRequest) -> tuple[str, str]:
-    """What the window of a chosen run says of it: its band, and the last sentence."""
-    if choice.training:
+def _band_and_last(request: RunRequest, last: str) -> tuple[str, str]:
+    """What the window of a run says of it: its band, and the last sentence, which is `last` where the run is kept."""
+    if request.training:
         return phrase("TRAINING – nothing of it is kept"), phrase("The training is over.")
-    if choice.practice:
+    if request.practice:
         return phrase("PRACTICE – never analysed"), phrase("The practice is over: the run itself comes next.")
-    names = study.experiments
-    later = names[names.index(choice.setup.config.experiment) + 1 :]
-    return "", phrase("Next: {later}.", later=later[0]) if later else THANK_PARTICIPANT
+    return "", last
+
+
+def _what_is_next(study: StudyFolder, experiment: str) -> str:
+    """What comes after an experiment of a study."""
+    later = study.experiments[study.experiments.index(experiment) + 1 :]
+    return phrase("Next: {later}.", later=later[0]) if later else THANK_PARTICIPANT
 
 
 def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest, markers: OpenMarkers) -> str:
@@ -138,8 +144,7 @@ WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_
 
 def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
     try:
-        band, last = _band_and_last(study, choice)
-        run_live(gone_on_with(choice), band=band, last=last)
+        run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment))
     except RunStopped as stop:
         return _stopped(choice, str(stop))
     except RecoilError as error:

@@ -126,7 +126,7 @@ def _remarks(
         yield (
             (phrase("{code} is new.", code=code), "good")
             if is_code(code)
-            else (phrase("{code} is no code: letters and digits only (A-Z, a-z, 0-9).", code=code), "bad")
+            else (phrase("{code} is no code: 1 to 32 letters and digits (A-Z, a-z, 0-9).", code=code), "bad")
         )
     else:
         yield _progress(person, experiment), "good"

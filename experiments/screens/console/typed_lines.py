@@ -22,8 +22,10 @@ LINE_QUESTIONS: dict[keys.Name, str] = {
 }
 
 
-def line_question(name: keys.Name, trial: Trial, live: LiveRun) -> str:
-    """What is asked above the line that a command needs."""
+def line_question(name: keys.Name, trial: Trial, live: LiveRun, *, kept: bool) -> str:
+    """What is asked above the line that a command needs; `kept`: the run is no practice and no training."""
+    if name == "stop" and not kept:
+        return phrase("Why does it stop here? It is begun anew each time.")
     place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
     return LINE_QUESTIONS[name].format(trial=trial.trial, place=place)
 
