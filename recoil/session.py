@@ -11,7 +11,7 @@ from pathlib import Path
 
 from analysis.report.terminal import say
 from device.serial_gun.gun import speed_of
-from device.words import few_of_each
+from device.words import few_of_each, said_by
 from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.door import ConfigError
@@ -261,10 +261,16 @@ def _needs_gui() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise PlaceError(
-            f"--screen console needs the screens ({error.name} is missing): run `make full` in Recoil's folder "
-            "(without make: docs/install.md), or use --screen terminal"
-        ) from error
+        raise _no_console(f"{error.name} is missing") from error
+    except Exception as error:  # whatever a broken library raises, or one that lacks another of the system
+        raise _no_console(f"they cannot be loaded: {said_by(error)}") from error
+
+
+def _no_console(why: str) -> PlaceError:
+    return PlaceError(
+        f"--screen console needs the screens ({why}): run `make full` in Recoil's folder (without make: "
+        "docs/install.md), or use --screen terminal; `recoil doctor` says what else is missing"
+    )
 
 
 def again(*, resume: bool, fresh: bool, reason: str) -> Again:

@@ -22,6 +22,7 @@ from multiprocessing import get_context, parent_process
 from typing import Any
 
 from analysis.report.copies import no_interrupt
+from device.words import said_by
 from experiments.config.door import ConfigError
 from experiments.record.provenance import recoil_version, versions
 
@@ -103,8 +104,10 @@ def _end_with_parent() -> None:
 def _cluster(address: str) -> Any:
     try:
         import distributed  # noqa: PLC0415 - the extra `dask`
-    except ModuleNotFoundError as error:
-        raise ConfigError('--scheduler needs Dask: install "recoil[dask]" here and on the workers') from error
+    except Exception as error:  # it is missing, or whatever a broken library raises
+        raise ConfigError(
+            f'--scheduler needs Dask ({said_by(error)}): install "recoil[dask]" here and on the workers'
+        ) from error
     if not re.fullmatch(_ADDRESS, address):  # some others would be tried in vain, and long
         raise ConfigError(f"--scheduler {address}: must be host and port, such as tcp://127.0.0.1:8786")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the message is ours

@@ -37,7 +37,7 @@ from device.physics.equations import (
     pack,
 )
 from device.physics.shot import ShotSummary, interpret, summary_from
-from device.words import RecoilError
+from device.words import RecoilError, said_by
 
 Records = NDArray[Any]
 """Arrays whose fields are those of `Constants`, or of `ShotResult`."""
@@ -111,10 +111,22 @@ MachineCode = Callable[..., None]
 
 
 @lru_cache(maxsize=1)
+def no_compiler() -> str:
+    """Why shots cannot be compiled, and what to do; empty if they can."""
+    if find_spec("numba") is None:
+        return 'numba is not installed: install "recoil[fast]"'
+    try:
+        import numba  # noqa: F401, PLC0415 - what is installed may be broken, of another Python, or lack a library
+    except Exception as error:  # noqa: BLE001 - whatever a broken library raises
+        return f'numba cannot be loaded ({said_by(error)}): install "recoil[fast]" anew'
+    return ""
+
+
+@lru_cache(maxsize=1)
 def machine_code() -> MachineCode:
     """The shots of many guns in machine code. `RecoilError`: there is no compiler."""
-    if find_spec("numba") is None:
-        raise RecoilError('compiled shots need numba, which is not installed: install "recoil[fast]"')
+    if why := no_compiler():
+        raise RecoilError(f"compiled shots need numba; {why}")
     import numba  # noqa: PLC0415 - the compiler waits until it is asked for
 
     from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler
@@ -197,7 +209,7 @@ def simulate_batch(
 ) -> ShotBatch:
     """The shots of `gun` with the parameters in `arrays` in place of its own, broadcast against each other.
 
-    Compiled where numba is installed, unless `interpreted` is asked for, which ends sooner for a few hundred shots.
+    Compiled where numba can be loaded, unless `interpreted` is asked for, which ends sooner for a few hundred shots.
     `progress` is called after every few thousand shots with their number. `ValueError`: no such parameter or fidelity.
     Numbers that physics has not make their shot `invalid` and no other one.
 
@@ -206,7 +218,7 @@ def simulate_batch(
     """
     gun, model, columns = gun or GunParameters(), model_number(fidelity), _columns(arrays)
     count = next((column.size for column in columns.values()), 1)
-    interprets = interpreted or find_spec("numba") is None
+    interprets = interpreted or bool(no_compiler())
     shoot = _interpret_each if interprets else partial(_shoot_compiled, machine_code())
     numbers = {name: np.empty(count) for name in ShotBatch.__slots__[1:]}
     found = ShotBatch(status=np.empty(count, np.int8), **numbers)

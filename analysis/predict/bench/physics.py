@@ -7,7 +7,6 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import pairwise
 
 from analysis.predict.bench.figure import Demand, TradeCurve, TradePanel
@@ -17,6 +16,7 @@ from analysis.report.section import Section, Table
 from device.methods import FRICTION_I_N, FRICTION_II_N
 from device.parameters import DriveOff, GunParameters
 from device.physics import FIDELITIES, simulate, simulate_batch
+from device.physics.batch import no_compiler
 from device.physics.scenes import OUTPUTS, SCENES, Scene, choose_model, stated_error
 
 OFF_STATES: tuple[DriveOff, ...] = ("open", "shorted")
@@ -88,7 +88,7 @@ def _measured(drive_off: DriveOff, fidelity: str, request: BenchRequest) -> Mode
         least=min(errors),
         stated=max(stated_error(fidelity, output, drive_off, "printed") for output in OUTPUTS),
         single_us=_median_us(single, SINGLE_SHOTS, request.repeats),
-        batch_us=_median_us(batch, request.batch, request.repeats) if find_spec("numba") else None,
+        batch_us=_median_us(batch, request.batch, request.repeats) if not no_compiler() else None,
     )
 
 

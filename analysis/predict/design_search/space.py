@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from analysis.stats.arrays import FloatArray
 from device.limits import MAX_SHOTS_PER_MINUTE
 from device.parameters import GunParameters
 from device.physics import ShotSummary, simulate, simulate_batch
+from device.physics.batch import no_compiler
 from device.physics.equations import COIL, FREE, HOME, STATUSES, pack
 from device.physics.traces import Segment, coil_forces, segments
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V
@@ -287,7 +287,7 @@ def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...])
 
 def summarised(row: FrictionRow) -> FrictionRow:
     """The row with its summaries from compiled code; the row as it is without the compiler (extra `fast`)."""
-    if find_spec("numba") is None:
+    if no_compiler():
         return row
     return replace(row, summaries=tuple(simulate_batch(row.gun, voltage_V=row.voltage_V).summaries()))
 

@@ -13,7 +13,6 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
@@ -31,6 +30,7 @@ from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
+from device.physics.batch import no_compiler
 from device.physics.equations import STATUSES
 from experiments.config.door import ConfigError
 from experiments.record import storage
@@ -214,7 +214,7 @@ def _shoot(
     """Block by block: the parameters that vary, and the shots."""
     shape = tuple(len(axis.values) for axis in axes)
     rows = math.prod(shape)
-    interpreted = rows <= FEW_SHOTS or not find_spec("numba")
+    interpreted = rows <= FEW_SHOTS or bool(no_compiler())
     block = _SLOW_BLOCK if interpreted else _BLOCK
     with progress("shots", math.ceil(rows / block)) as done:
         for start in range(0, rows, block):
@@ -227,11 +227,9 @@ def _shoot(
 
 def waiting_note() -> str:
     """What to say before many shots: how long they take."""
-    if find_spec("numba"):
-        return (
-            "note: compiled, which takes about half a minute the first time on a machine and a second or two later on"
-        )
-    return 'note: interpreted, about a millisecond a shot; install "recoil[fast]" for microseconds'
+    if why := no_compiler():
+        return f"note: interpreted, about a millisecond a shot; compiled it takes microseconds, and {why}"
+    return "note: compiled, which takes about half a minute the first time on a machine and a second or two later on"
 
 
 def table_sections(found: Sweep) -> tuple[Section, ...]:
