@@ -24,9 +24,8 @@ from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import generator
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
-from experiments.rebuild import began_with, shots_table, table
+from experiments.rebuild import table
 from experiments.record import replay, storage
-from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import (
     Contents,
     Journal,
@@ -43,10 +42,11 @@ from experiments.runner import Desk, carry_out
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Noted
-from experiments.session.steps import Answered, Session, step_record
+from experiments.session.steps import Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
+from experiments.written_tables import answers_in, tables_of_stopped, write_tables
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -235,7 +235,7 @@ def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest)
     """`PlaceError`: what a person answered is set aside, and nobody says why."""
     if contents is None or request.practice or request.anew_reason or contents.head.participant != "person":
         return
-    if count := sum(isinstance(word, Answered) for _, word in replay.history(contents)):
+    if count := answers_in(contents):
         raise PlaceError(
             f"{where.journal}: has answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
         )
@@ -429,7 +429,7 @@ def _to_the_end(
         why = str(stop) or "interrupted"
         desk.live.end(why)
         desk.live.write_stop(why)
-        saved = _write_table(place, desk.live.journal.read_back())
+        saved = tables_of_stopped(place, desk.live.journal.read_back(), why)
         if isinstance(stop, RunStopped):
             stop.saved = saved
         raise
@@ -440,16 +440,4 @@ def _to_the_end(
     contents = desk.live.journal.read_back()
     hashes = {"table_sha256": hashlib.sha256(table(contents)).hexdigest(), "journal_sha256": contents.sha256}
     desk.live.journal.append("finished", **hashes)
-    return _write_table(place, contents)
-
-
-def _write_table(place: Place, contents: Contents) -> int:
-    """Write the table from the journal as it was read back from the disk; the answers in it."""
-    storage.write_whole(place.table, table(contents))
-    design = began_with(contents.head)
-    measured = shots_table(contents)
-    if measured is not None:
-        storage.write_whole(place.shots, measured)
-    storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
-    told = replay.history(contents)
-    return sum(isinstance(word, Answered) for _, word in told)
+    return write_tables(place, contents)

@@ -62,6 +62,18 @@ def test_a_report_of_something_else_is_not_replaced_and_that_is_said_before_any_
     assert content(tmp_path) == {name: b"mine"}
 
 
+@pytest.mark.parametrize("name", [RECORD, "a_long.csv", "figures/a.png"])
+def test_a_file_of_something_else_is_not_replaced(tmp_path: Path, name: str) -> None:
+    placing.write_file(tmp_path, name, b"mine")
+    with pytest.raises(RecoilError, match=rf"has a?.*{re.escape(name)} of something else"):
+        put(tmp_path, FIRST)
+    assert content(tmp_path) == {name: b"mine"}
+    placing.write_file(tmp_path, "other.txt", b"mine as well")
+    (tmp_path / name).unlink()
+    put(tmp_path, FIRST)
+    assert content(tmp_path)["other.txt"] == b"mine as well"
+
+
 def test_a_report_that_comes_while_results_are_worked_out_is_not_replaced(tmp_path: Path) -> None:
     out = tmp_path / "out"
 
@@ -127,10 +139,12 @@ def test_what_a_killed_command_left_is_no_result_and_is_taken_away_by_the_next_o
 def test_two_at_work_in_one_folder_leave_each_other_alone(tmp_path: Path) -> None:
     with placing.results_in(tmp_path, RECORD) as one:
         placing.write_file(one, RECORD, b"one")
+        placing.write_file(one, "report.md", b"one")
         with placing.results_in(tmp_path, RECORD) as other:
             placing.write_file(other, RECORD, b"other")
+            placing.write_file(other, "report.md", b"other")
         assert (tmp_path / RECORD).read_bytes() == b"other"
-    assert content(tmp_path) == {RECORD: b"one"}
+    assert content(tmp_path) == {RECORD: b"one", "report.md": b"one"}
 
 
 def stops(*_: object) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from tests.at_terminal import DAMPER, FIRES, AtTerminal
+from tests.conftest import Recoil
 from tests.waiting import wait_for
 from tests.warm_start import warm
 
@@ -92,6 +93,25 @@ def test_a_break_is_counted_beside_what_is_typed(
         shown = screen.seen.partition("Break between sessions")[2]
     assert shown.partition("early.)\n")[2].startswith(" " * 9)
     assert (terminal == "xterm") == ("\x1b" in shown)
+
+
+def test_a_run_whose_table_cannot_be_written_as_it_stops_says_that_nothing_is_lost(
+    short_configs: Path, recoil: Recoil, tmp_path: Path
+) -> None:
+    folder = tmp_path / "results" / "sub-P01"
+    with AtTerminal(run(short_configs, "direction", "--seed", 3), tmp_path) as screen:
+        screen.answer_trials(2)
+        (folder / "sub-P01_task-direction_trials.csv").mkdir()  # nothing can be put there, as on a full disk
+        screen.type("!")
+        screen.wait_for("EMERGENCY STOP.")
+        screen.type("")
+        assert screen.end() == 130
+    assert "stopped: emergency stop; every answer is in the journal, but its table could not be written" in screen.seen
+    assert "Go on with --resume." in screen.seen
+    (folder / "sub-P01_task-direction_trials.csv").rmdir()
+    done = recoil("rebuild", folder / "sub-P01_task-direction_journal.jsonl")
+    assert done.returncode == 0
+    assert [row["response"] for row in rows(tmp_path, "direction_trials") if row["response"]] == ["forward", "backward"]
 
 
 def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_like_a_formula(

@@ -47,8 +47,9 @@ def results_in(out: Path, record: str, others: Sequence[str] = ()) -> Iterator[P
     So no figure of one analysis stands beside numbers of another, whenever one is interrupted. What results before
     these left there stays, and is named: all in their folders, and what `others`, patterns of names, fit.
 
-    `record`: the file of numbers that results of this kind have. `RecoilError`: a report in `out` without it, which is
-    of something else. `OSError`: a place that cannot be written to; before anything is done.
+    `record`: the file of numbers that results of this kind have. `RecoilError`: a file in `out` would be replaced that
+    is not of such results, which are a report and its record. `OSError`: a place that cannot be written to; before
+    anything is done.
     """
     made = [path for path in (out, *out.parents) if not path.exists()]
     storage.make_folder(out)
@@ -57,6 +58,7 @@ def results_in(out: Path, record: str, others: Sequence[str] = ()) -> Iterator[P
         with _part(out, ".part-") as part, _errors_name(out, part):
             yield part
             check_for_another(out, record)
+            _refuse_others_files(out, record, part)
             left = _left_over(out, part, others) if (out / record).exists() else []
             with no_interrupt():
                 _move_files(part, out)
@@ -70,12 +72,29 @@ def results_in(out: Path, record: str, others: Sequence[str] = ()) -> Iterator[P
 
 def check_for_another(out: Path, record: str) -> None:
     """`RecoilError` for a report in `out` that is of something else, as its file of numbers is not there."""
-    report = next((name for name in REPORT_FILES if (out / name).exists()), None)
+    report = _report_in(out)
     if report is not None and not (out / record).exists():
-        raise RecoilError(
-            f"{out}: has a {report} of something else (there is no {record} beside it); choose another folder, or move "
-            "that away"
-        )
+        raise RecoilError(f"{out}: has a {report} of something else (there is no {record} beside it); {_MOVE}")
+    if report is None and (out / record).exists():
+        raise RecoilError(f"{out}: has a {record} of something else (there is no report beside it); {_MOVE}")
+
+
+_MOVE = "choose another folder, or move that away"
+
+
+def _report_in(out: Path) -> str | None:
+    return next((name for name in REPORT_FILES if (out / name).exists()), None)
+
+
+def _refuse_others_files(out: Path, record: str, part: Path) -> None:
+    """`RecoilError` for files in `out` that would be replaced where no results of this kind are."""
+    if _report_in(out) is not None and (out / record).exists():
+        return
+    files = sorted(path.relative_to(part) for path in part.rglob("*") if path.is_file())
+    there = [file.as_posix() for file in files if os.path.lexists(out / file)]
+    if there:
+        names = first_few(there, _NAMED)
+        raise RecoilError(f"{out}: has {names} of something else (there is no {record} with a report); {_MOVE}")
 
 
 _NAMED = 5
