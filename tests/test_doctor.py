@@ -230,6 +230,7 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.not_fired(), "fails", "see to what “gun” says"),
         (verdicts.of_conformance([BROKEN]), "fails", "nobody may hold this gun"),
         (verdicts.of_link_failure("no answer"), "fails", "cable"),
+        (verdicts.of_wrong_version("speaks version 3"), "fails", "its firmware is that of this Recoil"),
         (verdicts.of_failure("gun", "gun plug-in bad: its import failed"), "fails", "uninstall it"),
         (verdicts.of_sensor(SENSOR), "good", ""),
         (verdicts.of_sensor(replace(SENSOR, shots_to_see=3.1)), "warning", "less noise"),

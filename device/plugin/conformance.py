@@ -269,6 +269,8 @@ def _trials(rig: ConformanceRig, gun: Gun) -> str:
             failed.append(str(error))
             least, status = 0, _recovered(gun)
         _expect(status.state == "disarmed", f"it is {status.state} after it was disarmed")
+        went_back = f"its count of shots went from {before} back to {status.shots}, as after a reset"
+        _expect(status.shots >= before, went_back)
         fired, before = status.shots - before, status.shots
         _expect(least <= fired <= 1, f"{fired} shots are counted for one that was ordered")
     allowed = max(1, MAX_FAILED * rig.trials)

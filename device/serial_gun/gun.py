@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from device.limits import DriveHistory, planned_start_s
 from device.methods import Method
-from device.serial_gun.lines import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure
+from device.serial_gun.lines import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure, WrongVersion
 from device.serial_gun.link import PLAIN_NAME, Link
 from device.serial_gun.reports import MAX_UNCERTAINTY_S, ShotOrder, ShotRequest, asked, ready_s, report
 from device.serial_gun.triggering import TRIES, Arming, Triggering, ask_again, standing
@@ -318,7 +318,8 @@ def open_serial(address: str, methods: Mapping[str, Method], clock: Callable[[],
     try:
         link.start(OPEN_S)
     except LinkError as error:
-        raise LinkError(f"{address}: {error}") from error
+        named = WrongVersion if isinstance(error, WrongVersion) else LinkError  # of which somebody can do something
+        raise named(f"{address}: {error}") from error
     gun = SerialGun(link, methods, clock, where.speed)
     known.append(gun.identify().serial)
     return gun

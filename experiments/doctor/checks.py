@@ -27,6 +27,7 @@ from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformanc
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
 from device.plugin.guard import GunLeftOpen, PluginError, begin_aside, interrupts_held, wait_awake
 from device.serial_gun.gun import SCHEME, speed_of
+from device.serial_gun.lines import WrongVersion
 from experiments.catalogues.catalogue import language
 from experiments.catalogues.fonts import font_for
 from experiments.catalogues.messages import NAMED_ANSWERS
@@ -265,6 +266,8 @@ def _gun(address: str, limit_s: float, methods: Mapping[str, Method] | None) -> 
         return (verdicts.of_link(_tried(address, seconds, guns, partial(gun_line, guns.open)), limit_s),)
     except PluginError as error:
         return (verdicts.of_failure("gun", str(error)),)
+    except WrongVersion as error:
+        return (verdicts.of_wrong_version(str(error)),)
     except (DeviceError, OSError) as error:
         return (verdicts.of_link_failure(str(error)),)
 

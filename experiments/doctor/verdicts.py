@@ -189,6 +189,12 @@ def of_link(found: figures.GunLine, limit_s: float) -> figures.DoctorFinding:
     return _judged("gun", measured, advice if found.round_trip_ms.p95 > 1000 * limit_s else "", found)
 
 
+def of_wrong_version(reason: str) -> figures.DoctorFinding:
+    """A gun that answers in another version of the wire."""
+    advice = "nothing can be said to this gun until its firmware is that of this Recoil: docs/howto/connect-a-gun.md"
+    return figures.DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
+
+
 def of_link_failure(reason: str) -> figures.DoctorFinding:
     """A gun that does not answer."""
     advice = "check power, cable and port; for a serial port you must be in the group dialout on Linux"
