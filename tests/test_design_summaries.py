@@ -14,6 +14,7 @@ from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.diagnostics import sphericity
 from analysis.summary.assumptions import not_spherical
 from analysis.summary.designs import summarise
+from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.designs import lacking_conditions
 from experiments.config.door import checked_table
@@ -264,8 +265,12 @@ def test_a_test_whose_own_p_misleads_is_named_in_a_warning():
     changed = replace(found, questions={"realism": replace(question, tests=(question.tests[0], unlike))})
     assert [*not_spherical("realism", changed)] == [
         "realism, realism, voltage_V: sphericity does not hold (Greenhouse-Geisser epsilon 0.55, below 0.75): read the "
-        "corrected p = 0.07; Tukey's test of pairs takes sphericity too"
+        "corrected p = 0.07"
     ]
+    pair = DesignTest(name="tukey", effect="a – b")
+    compared = replace(found, questions={"realism": replace(question, tests=(unlike, pair))})
+    (told,) = not_spherical("realism", compared)
+    assert told.endswith("the corrected p = 0.07; Tukey's test of pairs takes sphericity too")
 
 
 def test_factors_that_are_called_like_a_column_of_the_frame_stay_apart():

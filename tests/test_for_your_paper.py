@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -28,11 +29,12 @@ Reported = Callable[..., ReportData]
 @pytest.fixture
 def reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reported:
     """What `recoil analyze` would put on a page; no page is made."""
+    numbers = count()
 
     def run(*paths: Path, **asked: object) -> ReportData:
         found: list[ReportData] = []
         monkeypatch.setattr(sections, "write_report", lambda _, report, __: found.append(report))
-        feature.analyze(feature.Request(paths=paths, out=tmp_path / "out", **asked))  # type: ignore[arg-type]
+        feature.analyze(feature.Request(paths=paths, out=tmp_path / f"out-{next(numbers)}", **asked))  # type: ignore[arg-type]
         return found[0]
 
     return run

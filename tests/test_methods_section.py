@@ -26,7 +26,7 @@ def test_the_papers_first_experiment_reads_as_in_the_paper():
         "A trial was one shot. There was no feedback. 1 of each method and direction could be practised first; that "
         "was not analysed.\n"
         "After each trial participants were asked: “Which way did the gun shoot?” (forward or backward).\n"
-        "Sets were 20 s apart. Sessions were 300 s apart. The 60 trials took 30 min as planned."
+        "Sets were 20 s apart. Sessions were 300 s apart. The 60 trials were planned to take 30 min."
     )
 
 
@@ -44,7 +44,7 @@ def test_what_nesting_makes_differ_is_told_of_every_group_and_session():
     text = "\n".join(methods_section(nested, runs))
     assert "There were 2 or 3 sessions, each of one voltage in V" in text
     assert "In each session every condition came once, in random order: 2 trials." in text
-    assert "The 4 or 6 trials took 4 or 6 s as planned." in text
+    assert "The 4 or 6 trials were planned to take 4 or 6 s." in text
 
 
 @pytest.mark.parametrize(

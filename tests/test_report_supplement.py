@@ -54,7 +54,7 @@ def test_assumptions_are_said_and_those_that_do_not_hold_stand_with_the_data(tmp
     assert "Assumed: Participants are independent of each other" in further.paragraphs[-1]
     told = "\n".join(quality.items)
     assert told.count("sphericity does not hold") == 1
-    assert "Direction recognition: many participants score at an end of the scale" in told
+    assert "Direction recognition: participants score at an end of the scale" in told
     assert "Asymmetric Force II (ceiling 10 of 14)" in told
     assert "asymmetric-2" not in told
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from decimal import ROUND_HALF_UP, Decimal
 
 NO_NUMBER = "–"
 """Stands where there is no number."""
@@ -17,13 +18,23 @@ def known(value: float | None) -> float | None:
 def number(value: float | None, digits: int = 2) -> str:
     """`value` with so many decimals, and a true minus sign; a dash for None and for what is not finite.
 
-    >>> number(-1.2345), number(None), number(math.nan)
-    ('−1.23', '–', '–')
+    A half is rounded away from 0, wherever the last bits of its float lie: 49 of 80 is 61.3 % by whatever sum.
+
+    >>> number(-1.2345), number(None), number(math.nan), number(61.25, 1), number(100 * (0.1 + 0.5125), 1)
+    ('−1.23', '–', '–', '61.3', '61.3')
     """
     if value is None or not math.isfinite(value):
         return NO_NUMBER
-    text = f"{value:.{digits}f}"
+    text = f"{_rounded(value, digits) if abs(value) < _EXACT else value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
+
+
+_EXACT, _KNOWN_DIGITS = 1e12, 13
+"""Below this so many digits are more than the last bits of a sum disturb."""
+
+
+def _rounded(value: float, digits: int) -> Decimal:
+    return Decimal(f"{value:.{_KNOWN_DIGITS}g}").quantize(Decimal(1).scaleb(-digits), ROUND_HALF_UP)
 
 
 def figures(value: float | None) -> str:

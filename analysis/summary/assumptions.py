@@ -71,9 +71,7 @@ def _ends(found: WithinStatistics, beside: Supplement) -> Assumption:
         for method in found.methods
         if counts[method] > END_SHARE * n
     ]
-    warning = (
-        f"many participants score at an end of the scale, which shrinks variances: {', '.join(hit)}" if hit else None
-    )
+    warning = f"participants score at an end of the scale, which shrinks variances: {', '.join(hit)}" if hit else None
     return Assumption(assumption="The scale leaves room at both ends for every participant.", warning=warning)
 
 
@@ -121,8 +119,8 @@ def not_spherical(name: str, design: DesignSummary) -> Iterator[str]:
     for question, found in design.questions.items():
         for test in found.tests:
             if test.epsilon is not None and test.p_gg is not None and test.epsilon < EPSILON:
+                pairs = "; Tukey's test of pairs takes sphericity too" if found.compared else ""
                 yield (
                     f"{name}, {question}, {test.effect}: sphericity does not hold (Greenhouse-Geisser epsilon "
-                    f"{test.epsilon:.2g}, below {EPSILON}): read the corrected p = {test.p_gg:.2g}; Tukey's test of "
-                    "pairs takes sphericity too"
+                    f"{test.epsilon:.3g}, below {EPSILON}): read the corrected p = {test.p_gg:.2g}{pairs}"
                 )

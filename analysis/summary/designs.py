@@ -80,10 +80,14 @@ def _labels(design: DesignConfig, gun_labels: Mapping[str, str]) -> dict[str, di
 
 
 def _hands(design: DesignConfig, table: pd.DataFrame) -> Origin:
-    """Who answered the first question that says so."""
-    named = (f"{name}_{part}" for name in design.questions for part in ("source", "by"))
-    source = next((name for name in named if name in table), None)
-    return Origin(answers={}, guns={}) if source is None else origin_of(table.dropna(subset=[source]), source)
+    """Who gave each answer to each question that says so."""
+    named = ((name, f"{name}_{part}") for name in design.questions for part in ("source", "by"))
+    answers = [
+        table.loc[table[name].notna(), [source, "gun"]].rename(columns={source: "source"})
+        for name, source in named
+        if source in table
+    ]
+    return origin_of(pd.concat(answers).dropna(), "source") if answers else Origin(answers={}, guns={})
 
 
 def origin_of(rows: pd.DataFrame, source: str) -> Origin:

@@ -74,6 +74,17 @@ class QuestionSummary:
     not_above_0: int | None = field(default=None, metadata=OPTIONAL)
 
     @property
+    def pictured(self) -> tuple[ConditionSummary, ...]:
+        """The conditions of its picture: of pairs each item, and no catch trials beside what has a level."""
+        cells = self.preferred or self.cells
+        return tuple(cell for cell in cells if cell.levels) or cells
+
+    @property
+    def compared(self) -> bool:
+        """Whether any two conditions were tested against each other."""
+        return any(test.name == "tukey" for test in self.tests)
+
+    @property
     def lacked(self) -> str:
         """What somebody lacked in a condition who is in no test."""
         return "number above 0" if self.kind == "number" else "answer"

@@ -139,13 +139,26 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
         yield _tracks(design, design.adaptive, where, each)
         return
     times = {1: "once", 2: "twice"}.get(order.repetitions, f"{order.repetitions} times")
-    yield f"{where} every condition came {times}, {_HOW[order.trials]}: {_counts(each)} trials{_sets(design, each)}."
+    what, how = _what_came(design), _HOW[order.trials]
+    yield f"{where} every {what} came {times}, {how}: {_counts(each)} trials{_sets(design, each)}."
     if INSTRUCTION_FACTOR in design.factors:
         yield from _told(design, design.factors[INSTRUCTION_FACTOR])
     if order.set:
         yield f"{_listed([factor_words(name) for name in order.set]).capitalize()} was constant in a set."
     for name, most in order.longest_run.items():
         yield f"No level of {factor_words(name)} came more than {most} times in a row."
+
+
+def _what_came(design: DesignConfig) -> str:
+    """What comes so many times in a session: a condition, or what is left of it where sets have levels of their own."""
+    order, factors = design.order, design.factors
+    if design.trial.kind == "pair":
+        return "pair"
+    apart = {*order.session, *order.set, *design.between}
+    mixed = [factor_words(name) for name in factors if len(factors[name].all_levels) > 1 and name not in apart]
+    if not order.set or not mixed:
+        return "condition"
+    return mixed[0] if len(mixed) == 1 else f"combination of {_listed(mixed)}"
 
 
 def _tracks(design: DesignConfig, table: AdaptiveConfig, where: str, each: Sequence[int]) -> str:
@@ -248,11 +261,12 @@ def _rests(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
         yield f"Sessions were {breaks.between_sessions_s:g} s apart."
     trials, most = _counts(run.trials for run in runs), _durations(run.duration_s for run in runs)
     if all(run.least_trials == run.trials for run in runs):
-        yield f"The {trials} trials took {most} as planned." if trials != "1" else f"The trial took {most} as planned."
+        some = "trial was" if trials == "1" else f"{trials} trials were"
+        yield f"The {some} planned to take {most}."
     else:
         least = _durations(run.least_duration_s for run in runs)
         fewest = _counts(run.least_trials for run in runs)
-        yield f"A run took {fewest} trials and {least} at the least, {trials} trials and {most} at the most."
+        yield f"A run was planned to take {fewest} trials and {least} at the least, {trials} and {most} at the most."
 
 
 def _durations(seconds: Iterable[float]) -> str:

@@ -228,8 +228,9 @@ _SPELLED_OUT = 12
 
 
 def _means(found: DesignSummary, question: QuestionSummary) -> str:
-    told = [f"{_condition(found, question, cell)} {_mean(question, cell)}" for cell in question.cells[:_SPELLED_OUT]]
-    more = len(question.cells) - len(told)
+    cells = question.pictured
+    told = [f"{_condition(found, question, cell)} {_mean(question, cell)}" for cell in cells[:_SPELLED_OUT]]
+    more = len(cells) - len(told)
     return ", ".join(told) + (f" and {more} more conditions" if more else "")
 
 
@@ -309,9 +310,16 @@ def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:
     return (_TESTS.get(test.name, test.name), _effect(found, test), apa.number(test.statistic), df, p, more)
 
 
+def _condition_part(found: DesignSummary, part: str) -> str:
+    """A factor and its level by what that is called; else an effect in words."""
+    name, _, level = part.partition(" ")
+    label = found.labels.get(name, {}).get(level)
+    return effect_words(part) if label is None else f"{factor_words(name)} {display_name(label)}"
+
+
 def _effect(found: DesignSummary, test: DesignTest) -> str:
     """What was tested; of a pair both levels by what they are called."""
     if test.name != "tukey":
-        return effect_words(test.effect)
+        return ", ".join(_condition_part(found, part) for part in test.effect.split(", "))
     labels = {level: label for of in found.labels.values() for level, label in of.items()}
     return " – ".join(display_name(labels.get(level, level)) for level in test.effect.split(" – "))

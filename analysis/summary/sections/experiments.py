@@ -312,10 +312,11 @@ def _binomial_sentence(found: DirectionStatistics) -> str:
         away = sum(significant for significant, _ in tests)
         told = f"of {len(tests)} rates {away} differed significantly from 50 %; the table has all"
         return f"Exact binomial tests of the correct rates: {told}."
-    parts = []
-    for differs, words in ((False, "no significant difference from 50 %"), (True, "a significant one from 50 %")):
+    parts = list[str]()
+    for differs, words in ((False, "no significant difference"), (True, "a significant one")):
         shown = "; ".join(text for significant, text in tests if significant is differs)
-        parts += [f"{words} ({shown})"] if shown else []
+        difference = words if parts or not differs else "a significant difference"
+        parts += [f"{difference} from 50 % ({shown})"] if shown else []
     return f"Exact binomial tests of the correct rates: {', and '.join(parts)}."
 
 

@@ -87,7 +87,8 @@ _HANDS = {"right": "right-handed", "left": "left-handed", "both": "ambidextrous"
 
 
 def _design(report: ReportData, found: WithinStatistics) -> str:
-    methods = f"{len(found.methods)} rendering methods ({', '.join(map(display_name, found.methods))})"
+    named = ", ".join(map(display_name, found.methods))
+    methods = f"{how_many(len(found.methods), 'rendering method')} ({named})"
     if not isinstance(found, DirectionStatistics):
         low, high = report.rated_from or (0.0, 10.0)
         rescaled = "" if (low, high) == (0.0, 10.0) else ". Ratings were rescaled linearly to 0 to 10"
