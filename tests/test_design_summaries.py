@@ -16,7 +16,7 @@ from analysis.summary.assumptions import not_spherical
 from analysis.summary.designs import summarise
 from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
-from analysis.summary.sections.designs import lacking_conditions
+from analysis.summary.sections.designs import lacking_conditions, result_sentences
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
@@ -165,6 +165,15 @@ def test_numbers_by_methods_have_no_exponent():
     rows = [(f"P{n}", method, float(n + k)) for n in range(1, 5) for k, method in enumerate("abc")]
     found = summarise(config, pd.DataFrame(rows, columns=["participant_id", "method", "q"]))
     assert [test.name for test in found.questions["q"].tests] == ["anova", "tukey", "tukey", "tukey"]
+
+
+def test_an_effect_that_is_the_same_in_everybody_is_told_as_a_test():
+    config, laws = loaded("preference")
+    table = simulated(config, laws, 4)
+    table["rating"] = table["method"].map({"vibration": 2.0, "asymmetric-1": 5.0, "asymmetric-2": 8.0})
+    (told,) = result_sentences("preference", summarise(config, table))
+    assert "significant effect of method, F(2, 6) = ∞, p < .001" in told
+    assert "No test of method" not in told
 
 
 def test_a_single_person_is_described_and_not_tested():

@@ -4,7 +4,7 @@
     drop_flags = ["device-error", "interrupted"]
     response_time_min_s = 0.2                  # bounds bind the participant's own times only
     response_time_max_s = 10.0
-    drop_unanswered = true                     # without it, one unanswered trial leaves the participant out
+    drop_unanswered = true                     # else one leaves a person out of direction and preference
 
     [participants]                             # participants who do not count
     min_kept_share = 0.8                       # of their trials, after dropping

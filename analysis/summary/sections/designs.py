@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -113,8 +114,8 @@ def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
 
 def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
     planned = [test for test in question.tests if _standing(question, test) == "planned"]
-    yield from (f"No test of {effect_words(test.effect)}: {test.reason}." for test in planned if test.reason)
-    anovas = [_anova_words(test, exact=exact) for test in planned if test.name == "anova" and not test.reason]
+    yield from (f"No test of {effect_words(test.effect)}: {test.reason}." for test in planned if _is_none(test))
+    anovas = [_anova_words(test, exact=exact) for test in planned if test.name == "anova" and not _is_none(test)]
     if anovas:
         yield f"ANOVA: {'; '.join(anovas)}."
     yield from (_ranks_words(test, exact=exact) for test in planned if test.name == "friedman" and not test.reason)
@@ -131,6 +132,11 @@ def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
     d_prime = next((test for test in question.tests if test.name == "d_prime"), None)
     if d_prime is not None:
         yield f"All answers together gave d′ = {apa.number(d_prime.statistic)}."
+
+
+def _is_none(test: DesignTest) -> bool:
+    """Whether there is no test: where everybody differs alike F is infinite, and that is one."""
+    return bool(test.reason) and (test.p is None or math.isnan(test.p))
 
 
 def _anova_words(test: DesignTest, *, exact: bool) -> str:

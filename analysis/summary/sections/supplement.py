@@ -172,7 +172,12 @@ def _model_words(model: NamedModel) -> str:
     equal = model.fit.test
     if model.fit.reason:
         return f"No logistic model of the forward answers. {named(model.fit.reason)}"
-    test = f"Equal odds of all methods: {apa.f_test(equal.F, equal.df, equal.p)}. " if equal else ""
+    test = (
+        f"Equal odds of all methods: {apa.f_test(equal.F, equal.df, equal.p)}. "
+        if equal
+        else "No joint test of equal odds: it takes as many people as methods, and no two methods that differ alike in "
+        "everybody. "
+    )
     return f"Model of the forward answers: {model.name}. {test}{model.note}"
 
 
