@@ -9,6 +9,7 @@ import pytest
 
 from analysis.predict.bench import run as feature
 from analysis.predict.synthetic_studies import percepts_of_methods
+from analysis.report import apa
 from analysis.report.terminal import unseen
 from device.physics import FIDELITIES
 from device.physics.scenes import SCENES
@@ -111,7 +112,7 @@ def test_parts_without_a_trade_have_no_figure(recoil: Recoil, tmp_path: Path) ->
     page = (out / "report.md").read_text(encoding="utf-8")
     assert all(row["post_hoc"] in page for row in found["post-hocs"])
     pooled = next(row for row in found["post-hocs"] if row["claimed"] == 0.05)
-    assert f"{pooled['null_error']:.4f}" in page
+    assert apa.number(pooled["null_error"], 4) in page
     assert (out / "report.html").stat().st_mode & 0o077 == 0
     assert not (out / "figures").exists()
 

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.predict.design_search import space as design_shots
 from analysis.predict.design_search.choice import both_ways, evidences, logits, predict, rates
 from analysis.predict.design_search.space import COIL_POINTS, FREE_POINTS, FrictionRow, shot_percepts, shots, summarised
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
@@ -28,7 +27,7 @@ from device.limits import (
 )
 from device.methods import paper_methods
 from device.parameters import GunParameters
-from device.physics import simulate, trace
+from device.physics import batch, simulate, trace
 from device.physics.equations import HOME
 from device.words import LimitError, Pulse
 from experiments.synthetic.decision import forward_rates
@@ -93,7 +92,7 @@ def test_the_compiled_summaries_give_the_same_shots() -> None:
 
 
 def test_without_the_compiler_the_workers_simulate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(design_shots, "find_spec", lambda _name: None)
+    monkeypatch.setattr(batch, "find_spec", lambda _name: None)
     row = FrictionRow(gun=GUN, voltage_V=(16.0,), leaks_s=(0.02,))
     assert summarised(row) is row
     assert shots(row)[0].status == HOME

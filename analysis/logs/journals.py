@@ -122,13 +122,13 @@ def compared(path: str, content: bytes) -> Beside | None:
         data = storage.read_whole(where)
     except OSError as error:
         return Beside(f"its journal cannot be read ({error.strerror}), so nothing proves the table", "")
-    return Beside(compared_with(data, path, content), setup_in(data))
+    return Beside(compared_with(data, path, content), setup_hash(data))
 
 
 _SETUP = re.compile(rb'"setup_sha256":"([0-9a-f]{64})"')
 
 
-def setup_in(data: bytes) -> str:
+def setup_hash(data: bytes) -> str:
     """The hash of the setup in the first line of a journal; empty if there is none."""
     found = _SETUP.search(data, 0, data.find(b"\n"))
     return found[1].decode() if found else ""

@@ -110,7 +110,6 @@ MachineCode = Callable[..., None]
 """`device.physics.lanes.shoot_each` of (guns, results, those to be shot alone, *room)."""
 
 
-@lru_cache(maxsize=1)
 def no_compiler() -> str:
     """Why shots cannot be compiled, and what to do; empty if they can."""
     if find_spec("numba") is None:

@@ -266,7 +266,8 @@ def _rests(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     else:
         least = _durations(run.least_duration_s for run in runs)
         fewest = _counts(run.least_trials for run in runs)
-        yield f"A run was planned to take {fewest} trials and {least} at the least, {trials} and {most} at the most."
+        least, most = f"{fewest} trials and {least} at the least", f"{trials} trials and {most} at the most"
+        yield f"A run was planned to take {least}, {most}."
 
 
 def _durations(seconds: Iterable[float]) -> str:
