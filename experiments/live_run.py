@@ -113,8 +113,8 @@ class LiveRun:
         self.news = threading.Condition(threading.RLock())
         self.disarming: list[threading.Thread] = []
         self.halt_unsaved = False
-        self.gun_fault = ""
-        """Why the gun is not to be fired, as whoever looks at it meanwhile has seen it last."""
+        self.gun_silence = ""
+        """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
 
     # for everybody
 
@@ -142,7 +142,7 @@ class LiveRun:
                 painted_s=self._painted_s,
                 guard_s=self.guard_s,
                 pauses=[*self._pauses, *([] if began_s is None else [(began_s, math.inf)])],
-                gun_fault=self.gun_fault,
+                gun_silence=self.gun_silence,
             )
 
     def painted(self, serial: int, at_s: float) -> None:

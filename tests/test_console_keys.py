@@ -91,9 +91,9 @@ def test_where_nothing_is_typed_a_letter_is_a_command_and_with_ctrl_as_well_but_
 @pytest.mark.parametrize("position", NO_FIELD, ids=lambda position: position.state)
 def test_a_letter_of_answer_and_command_is_the_command_but_for_where_it_is_asked_for(position: Position) -> None:
     asked = choices(QuestionConfig(kind="choice", text="?", answers=("note", "pleasant", "much", "young")))
-    assert [one.key for one in asked] == ["n", "p", "m", "y"]
+    assert [one.key for one in asked] == ["n", "p", "u", "y"]  # no answer says that the damper is set
     found = [
-        command_for(key, ctrl=False, typing=NOTHING, position=position, choices=asked) for key in ("N", "P", "M", "Y")
+        command_for(key, ctrl=False, typing=NOTHING, position=position, choices=asked) for key in ("N", "P", "U", "Y")
     ]
     answers = ["answer 1", "answer 2", "answer 3", "answer 4"]
     pause = "go on" if position.state is S.PAUSED else "pause"
@@ -102,7 +102,7 @@ def test_a_letter_of_answer_and_command_is_the_command_but_for_where_it_is_asked
     elif position.state in (S.FIRING, S.SAVING):  # too soon, or twice; the gun can be held all the same
         assert found == [answers[0], pause, *answers[2:]]
     else:
-        assert found == ["note", pause, "damper", "reason"]
+        assert found == ["note", pause, "undo", "reason"]
 
 
 @pytest.mark.parametrize("line", [False, True])

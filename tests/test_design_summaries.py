@@ -122,6 +122,28 @@ def test_pairs_are_described_in_the_order_in_which_they_were_felt():
     assert sum(cell.trials for cell in cells) == 24 * 20
 
 
+def test_pairs_that_came_in_one_order_leave_nobody_out():
+    config, laws = loaded("pairs")
+    table = simulated(config, laws, 4)
+    once = table[table["method_1"] < table["method_2"]]
+    found = summarise(
+        config, pd.concat([once[once["participant_id"] != "P03"], table[table["participant_id"] == "P03"]])
+    )
+    assert found.questions["rather"].left_out == ()
+
+
+def test_answers_are_counted_by_question_and_guns_by_trial():
+    config, laws = loaded("realism")
+    table = simulated(config, laws, 3)
+    table["gun"] = "simulated"
+    first, second = config.questions
+    table[f"{first}_by"], table[f"{second}_by"] = "experimenter", "participant"
+    table.loc[0, second] = np.nan
+    found = summarise(config, table).origin
+    assert found.answers == {"experimenter": len(table), "participant": len(table) - 1}
+    assert found.guns == {"simulated": len(table)}
+
+
 def test_whoever_lacks_a_condition_is_named_and_in_no_test():
     config, laws = loaded("preference")
     table = simulated(config, laws, 6)

@@ -168,13 +168,13 @@ def test_what_stops_or_holds_is_not_guarded(event: Event, tmp_path: Path) -> Non
         assert sitting.live.offer(event, Press(at_s=0.0, serial=-1))
 
 
-def test_a_gun_in_trouble_is_not_fired_until_it_is_seen_to(tmp_path: Path) -> None:
+def test_a_gun_that_does_not_answer_is_not_fired_until_it_does(tmp_path: Path) -> None:
     with sat_at(S.PREPARING, tmp_path) as sitting:
-        sitting.live.gun_fault = "the gun is not there."
+        sitting.live.gun_silence = "the gun is not there."
         refused = by_hand(sitting, events.Fire())
         assert refused == EventVerdict(taken=False, text="See to the gun first: the gun is not there.")
         assert sitting.position.state is S.PREPARING
-        sitting.live.gun_fault = ""
+        sitting.live.gun_silence = ""
         assert by_hand(sitting, events.Fire())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import pytest
 
 from analysis.logs.exclusions import IN_NO_TEST, LeftOut
 from analysis.logs.reading import read_logs
+from analysis.logs.setups import SetupOfLog, changed_setups
 from analysis.summary.analyze import with_everybody
 from analysis.summary.participation import PersonInExperiment, exclusion_lines
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
+from experiments.record.tables import DataKind
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
@@ -59,6 +62,20 @@ def test_a_gun_that_was_changed_within_a_study_is_told(
     done = recoil("analyze", "results", "--out", "out")
     assert (done.returncode, "were made with 2 setups" in done.stderr) == (1, True)
     assert "were made with 2 setups" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_data_of_two_kinds_do_not_count_together_whatever_their_setups() -> None:
+    kinds: tuple[DataKind, ...] = ("real", "real", "synthetic")
+    logs = [
+        SetupOfLog(study="a", kind=kind, experiment="direction", code=f"P{n}", path=f"P{n}.csv", setup=f"{n // 2}")
+        for n, kind in enumerate(kinds)
+    ]
+    assert changed_setups(logs) == []
+    (told,) = changed_setups([*logs, replace(logs[0], setup="2", code="P9")])
+    assert (
+        "3 runs of direction were made with 2 setups (config and gun) and count together: P0, P1 with one, P9 with"
+        in (told.message)
+    )
 
 
 def broken_off(folder: Path, code: str, records: int) -> Path:

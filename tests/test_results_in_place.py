@@ -62,16 +62,26 @@ def test_a_report_of_something_else_is_not_replaced_and_that_is_said_before_any_
     assert content(tmp_path) == {name: b"mine"}
 
 
-@pytest.mark.parametrize("name", [RECORD, "a_long.csv", "figures/a.png"])
-def test_a_file_of_something_else_is_not_replaced(tmp_path: Path, name: str) -> None:
-    placing.write_file(tmp_path, name, b"mine")
-    with pytest.raises(RecoilError, match=rf"has a?.*{re.escape(name)} of something else"):
+def test_a_record_without_a_report_is_of_something_else_and_not_replaced(tmp_path: Path) -> None:
+    placing.write_file(tmp_path, RECORD, b"mine")
+    with pytest.raises(RecoilError, match=rf"has a {re.escape(RECORD)} of something else"):
         put(tmp_path, FIRST)
-    assert content(tmp_path) == {name: b"mine"}
+    assert content(tmp_path) == {RECORD: b"mine"}
+
+
+@pytest.mark.parametrize("name", ["a_long.csv", "figures/a.png"])
+def test_a_file_of_something_else_is_set_aside(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    placing.write_file(tmp_path, name, b"mine")
     placing.write_file(tmp_path, "other.txt", b"mine as well")
-    (tmp_path / name).unlink()
     put(tmp_path, FIRST)
-    assert content(tmp_path)["other.txt"] == b"mine as well"
+    aside = name.replace(".", ".aside-1.")
+    assert content(tmp_path) == {
+        **{name: text.encode() for name, text in FIRST.items()},
+        aside: b"mine",
+        "other.txt": b"mine as well",
+    }
+    said = f"recoil: {tmp_path / name}: is of something else, and was set aside as {tmp_path / aside}\n"
+    assert capsys.readouterr().err == said
 
 
 def test_a_report_that_comes_while_results_are_worked_out_is_not_replaced(tmp_path: Path) -> None:

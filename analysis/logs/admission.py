@@ -153,6 +153,7 @@ class LogsSoFar:
         return changed_setups(
             SetupOfLog(
                 study=study,
+                kind=self.kinds[number],
                 experiment=self.experiments[number],
                 code=self.codes[number],
                 path=self.paths[number // LOGS_A_FILE],

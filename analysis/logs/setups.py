@@ -12,6 +12,7 @@ from analysis.logs.journals import journal_of
 from device.words import first_few, how_many
 from experiments.record import journal
 from experiments.record.journal import JournalError
+from experiments.record.tables import DataKind
 from experiments.study.preregistration import Files, changed_keys, plain_value
 
 _NAMED = 20
@@ -20,9 +21,13 @@ _NAMED = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetupOfLog:
-    """With which setup a log was made: the study's folder, experiment, code, the log's path, and the setup's hash."""
+    """With which setup a log was made: the study's folder, experiment, code, the log's path, and the setup's hash.
+
+    Logs of another `kind` of data do not count together.
+    """
 
     study: str
+    kind: DataKind | None
     experiment: str
     code: str
     path: str
@@ -31,10 +36,10 @@ class SetupOfLog:
 
 def changed_setups(logs: Iterable[SetupOfLog]) -> list[Problem]:
     """Of each study's experiment whose logs were made with several setups: whose, and what differs between them."""
-    groups: dict[tuple[str, str], dict[str, list[SetupOfLog]]] = {}
+    groups: dict[tuple[str, str, DataKind | None], dict[str, list[SetupOfLog]]] = {}
     for log in logs:
         if log.setup:
-            groups.setdefault((log.study, log.experiment), {}).setdefault(log.setup, []).append(log)
+            groups.setdefault((log.study, log.experiment, log.kind), {}).setdefault(log.setup, []).append(log)
     return [_told(setups) for setups in groups.values() if len(setups) > 1]
 
 

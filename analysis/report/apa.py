@@ -76,7 +76,7 @@ def p_cell(p: float | None) -> str:
         return NO_NUMBER
     if p < 0.001:
         return "< .001"
-    return "> .999" if p > 0.9995 else f"{p:.3f}".removeprefix("0")
+    return "> .999" if p >= 0.9995 else number(p, 3).removeprefix("0")
 
 
 def p_value(p: float | None, *, exact: bool = False) -> str:

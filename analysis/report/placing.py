@@ -47,9 +47,9 @@ def results_in(out: Path, record: str, others: Sequence[str] = ()) -> Iterator[P
     So no figure of one analysis stands beside numbers of another, whenever one is interrupted. What results before
     these left there stays, and is named: all in their folders, and what `others`, patterns of names, fit.
 
-    `record`: the file of numbers that results of this kind have. `RecoilError`: a file in `out` would be replaced that
-    is not of such results, which are a report and its record. `OSError`: a place that cannot be written to; before
-    anything is done.
+    `record`: the file of numbers that results of this kind have. `RecoilError`: in `out` a report or such a file
+    stands alone, which is of something else; `OSError`: a place that cannot be written to; before anything is done.
+    Other files that would be replaced, where no results of this kind are, are set aside.
     """
     made = [path for path in (out, *out.parents) if not path.exists()]
     storage.make_folder(out)
@@ -58,9 +58,11 @@ def results_in(out: Path, record: str, others: Sequence[str] = ()) -> Iterator[P
         with _part(out, ".part-") as part, _errors_name(out, part):
             yield part
             check_for_another(out, record)
-            _refuse_others_files(out, record, part)
+            aside = _others_files(out, record, part)
             left = _left_over(out, part, others) if (out / record).exists() else []
             with no_interrupt():
+                for file in aside:
+                    say(f"recoil: {file}: is of something else, and was set aside as {storage.set_aside_file(file)}")
                 _move_files(part, out)
         if left:
             say(f"recoil: {out}: of results before these, and left there: {first_few(left, _NAMED)}")
@@ -86,15 +88,12 @@ def _report_in(out: Path) -> str | None:
     return next((name for name in REPORT_FILES if (out / name).exists()), None)
 
 
-def _refuse_others_files(out: Path, record: str, part: Path) -> None:
-    """`RecoilError` for files in `out` that would be replaced where no results of this kind are."""
-    if _report_in(out) is not None and (out / record).exists():
-        return
+def _others_files(out: Path, record: str, part: Path) -> list[Path]:
+    """The files in `out` that would be replaced where no results of this kind are."""
+    if (out / record).exists():
+        return []
     files = sorted(path.relative_to(part) for path in part.rglob("*") if path.is_file())
-    there = [file.as_posix() for file in files if os.path.lexists(out / file)]
-    if there:
-        names = first_few(there, _NAMED)
-        raise RecoilError(f"{out}: has {names} of something else (there is no {record} with a report); {_MOVE}")
+    return [out / file for file in files if (out / file).is_file()]
 
 
 _NAMED = 5

@@ -80,23 +80,22 @@ def _labels(design: DesignConfig, gun_labels: Mapping[str, str]) -> dict[str, di
 
 
 def _hands(design: DesignConfig, table: pd.DataFrame) -> Origin:
-    """Who gave each answer to each question that says so."""
-    named = ((name, f"{name}_{part}") for name in design.questions for part in ("source", "by"))
-    answers = [
-        table.loc[table[name].notna(), [source, "gun"]].rename(columns={source: "source"})
-        for name, source in named
-        if source in table
-    ]
-    return origin_of(pd.concat(answers).dropna(), "source") if answers else Origin(answers={}, guns={})
+    """Who gave each answer to each question that says so, and who rendered each trial that has one."""
+    named = [(name, f"{name}_{part}") for name in design.questions for part in ("source", "by")]
+    asked = {name: source for name, source in named if source in table}
+    if not asked:
+        return Origin(answers={}, guns={})
+    hands = pd.concat([table.loc[table[name].notna(), source] for name, source in asked.items()])
+    return Origin(answers=_counted(hands), guns=_counted(table.loc[table[list(asked)].notna().any(axis=1), "gun"]))
 
 
 def origin_of(rows: pd.DataFrame, source: str) -> Origin:
     """Whose hands stand in the column `source`, and the guns."""
-    answers, guns = (
-        {str(name): int(count) for name, count in sorted(rows[column].value_counts().items(), key=_most_first)}
-        for column in (source, "gun")
-    )
-    return Origin(answers=answers, guns=guns)
+    return Origin(answers=_counted(rows[source]), guns=_counted(rows["gun"]))
+
+
+def _counted(names: pd.Series) -> dict[str, int]:
+    return {str(name): int(count) for name, count in sorted(names.value_counts().items(), key=_most_first)}
 
 
 def _most_first(counted: tuple[Hashable, int]) -> tuple[int, str]:
@@ -122,7 +121,8 @@ def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> Que
     scored = table.assign(score=answer_scores(design.questions[name], table[column])).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
     people = _complete(real, varied(design))
-    left_out = sorted({*table["participant_id"].astype(str)} - {*people.index.astype(str)})
+    tested = real["participant_id"] if design.trial.kind == "pair" else people.index  # pairs have scores, and no tests
+    left_out = sorted({*table["participant_id"].astype(str)} - {*tested.astype(str)})
     return QuestionScores(scored=scored, real=real, people=people, left_out=tuple(left_out))
 
 

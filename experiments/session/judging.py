@@ -22,7 +22,7 @@ class Moment:
     """All that an event is judged by.
 
     `painted_s` is when the position was on the screen; a press within `guard_s` after that is ignored; `pauses`
-    are begin and end of each; `gun_fault` is why the gun is not to be fired, as far as somebody looked.
+    are begin and end of each; `gun_silence` is why the gun does not answer, as far as somebody looked.
     """
 
     plan: Plan
@@ -32,7 +32,7 @@ class Moment:
     painted_s: float | None
     guard_s: float
     pauses: Sequence[tuple[float, float]] = ()
-    gun_fault: str = ""
+    gun_silence: str = ""
 
     @property
     def trial(self) -> Trial:
@@ -138,8 +138,8 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return _taken(moment, rank)
         case events.Answer(response=response) if not _is_choice(moment, response):
             return f"“{response}” is not among the answers."
-        case events.Fire() if moment.gun_fault:
-            return f"See to the gun first: {moment.gun_fault.rstrip('.')}."
+        case events.Fire() if moment.gun_silence:
+            return f"See to the gun first: {moment.gun_silence.rstrip('.')}."
         case events.Undo() if moment.further_back is None:
             return "There is nothing to undo in this set."
         case events.Undo() if moment.further_back == moment.position.correcting:

@@ -215,9 +215,10 @@ def not_on_record(results: Path, participant_id: str) -> str:
     if not (missing or reasons):
         return ""
     said = f"{', '.join(map(fact_text, missing))} not on record" if missing else f"not eligible: {'; '.join(reasons)}"
+    then = "with their facts puts them on record" if missing else "corrects facts, --exclude leaves them out"
     return (
         f"participant {participant_id}: {said} (rules: {source}); the run goes on all the same; "
-        f"`recoil study {results} --join {participant_id}` with their facts puts them on record"
+        f"`recoil study {results} --join {participant_id}` {then}"
     )
 
 

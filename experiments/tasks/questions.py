@@ -48,7 +48,7 @@ def choices_of(labels: Mapping[str, str], own_keys: Mapping[str, str]) -> tuple[
     >>> [one.key for one in choices_of({"forward": "vorwärts", "backward": "rückwärts"}, {})]
     ['v', 'r']
     """
-    keys = free_keys(labels, {})
+    keys = free_keys(labels, {}, reserved=CONFIRMS)
     return tuple(
         Choice(answer=answer, label=label, key=keys[answer], own_key=own_keys.get(answer, keys[answer]))
         for answer, label in labels.items()
@@ -65,7 +65,11 @@ def first_choices(design: DesignConfig) -> tuple[Choice, ...]:
     return next(filter(None, map(choices, design.questions.values())), ())
 
 
-def free_keys(labels: Mapping[str, str], given: Mapping[str, str]) -> dict[str, str]:
+CONFIRMS = "m"
+"""The experimenter's key that says that the damper is set: no answer has it, as a second press would say so as well."""
+
+
+def free_keys(labels: Mapping[str, str], given: Mapping[str, str], *, reserved: str = "") -> dict[str, str]:
     """A key for each answer: the one given, or the first letter of its label that is free, or a digit.
 
     >>> free_keys({"fast": "fast", "faster": "faster", "1": "№"}, {"fast": "x"})
@@ -75,7 +79,7 @@ def free_keys(labels: Mapping[str, str], given: Mapping[str, str]) -> dict[str, 
     for answer, label in labels.items():
         if answer not in keys:
             letters = [letter for letter in label.casefold() if letter in ascii_lowercase]
-            taken = set(keys.values())
+            taken = {*keys.values(), *reserved}
             keys[answer] = next(key for key in (*letters, *digits[1:], *ascii_lowercase) if key not in taken)
     return {answer: keys[answer] for answer in labels}
 

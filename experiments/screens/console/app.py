@@ -230,14 +230,14 @@ class Console:
         return self
 
     def _look_at(self, live: LiveRun) -> None:
-        """Look at the gun until the run ends: a gun in trouble is not fired."""
+        """Look at the gun until the run ends: one that does not answer is not fired, one with a fault does not arm."""
         while not self._over.is_set():
             asked_s = self.clock.now()
             try:
                 seen = view.GunSeen(status=live.gun.status(), asked_s=asked_s)
             except DeviceError as error:
                 seen = view.GunSeen(status=None, asked_s=asked_s, fault=str(error))
-            live.gun_fault = seen.trouble
+            live.gun_silence = seen.fault
             self._tell(seen)
             self._over.wait(GUN_LOOK_S)
 

@@ -156,7 +156,7 @@ class Buttons:
         shown = set[str]() if over else set(_shown(position, screen_lost=not idle("restart")))
         choices = () if over else choices_at(position)
         asks = bool(choices) and position.state in (State.ASKING, State.CORRECTING)
-        hidden = {"fire"} if idle("fire") else set[str]()  # nobody is shown to fire a gun in trouble
+        hidden = {"fire"} if idle("fire") else set[str]()  # nobody is shown to fire a gun that does not answer
         large: set[QtWidgets.QWidget] = {button for name, button in self._large.items() if name in shown - hidden}
         self.slots.show_only(large | set(self._answers if asks else ()))
         half = (len(choices) + 1) // 2

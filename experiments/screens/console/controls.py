@@ -258,7 +258,7 @@ class Controls:
     def _nothing_to(self, name: keys.Name) -> str:
         if name == "repeat" and self._live.moment.repeatable is None:
             return phrase("There is no trial of this set to repeat now.")
-        if name == "fire" and self._live.gun_fault:
+        if name == "fire" and self._live.gun_silence:
             return phrase("See to the gun first.")
         if name == "undo" and self._live.moment.further_back is None:
             return phrase("There is nothing to undo in this set.")

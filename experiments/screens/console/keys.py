@@ -17,7 +17,7 @@ from experiments.session import events
 from experiments.session.events import Event
 from experiments.session.states import No, Position, State, change_of
 from experiments.session.steps import Ask, Describe, Rate
-from experiments.tasks.questions import Choice, choices
+from experiments.tasks.questions import CONFIRMS, Choice, choices
 
 BOUNCE_S = 0.02
 """A key that goes down again so soon was not let go by a hand: an auto-repeat told as two events, or a bounce."""
@@ -95,7 +95,7 @@ KEY_COMMANDS: tuple[KeyCommand, ...] = (
     _C(name="next", key="Space", text=phrase("“Next” was said"), does=phrase("ends the train"), kind=events.Next),
     _C(
         name="damper",
-        key="M",
+        key=CONFIRMS.upper(),
         text=phrase("It is set"),
         does=phrase("says that what is set by hand is set"),
         kind=events.DamperSet,
