@@ -79,8 +79,11 @@ def test_answers_that_have_no_room_on_their_buttons_are_listed_with_their_keys(a
     asked = choices_of({answer: answer for answer in answers}, {})
     step = replace(ask(plan_of(DIRECTION).trials[0]), choices=asked)
     shown = instruction(seen(DIRECTION, Position(states=(State.ASKING,), step=step))).detail
-    listed = [f"{one.key.upper()}  {one.told}" in shown for one in asked]
-    assert listed == [len(answers) > 2] * len(answers)
+    there = seen(DIRECTION, Position(states=(State.ASKING,), step=step))
+    by_own_key = instruction(replace(there, about=replace(there.about, participant_keys=True))).detail
+    for detail in (shown, by_own_key):
+        listed = [f"{one.key.upper()}  {one.told}" in detail for one in asked]
+        assert listed == [len(answers) > 2] * len(answers)
 
 
 def test_a_correction_names_its_question_where_several_of_its_kind_are_asked() -> None:

@@ -133,8 +133,8 @@ def _asking(seen: Seen) -> Instruction:
         keys=_keys(step),
     )
     listed = "" if is_on_buttons(step.choices) else "".join(f"\n{one.key.upper()}  {one.told}" for one in step.choices)
-    told = phrase("Enter what the participant says: {keys}.", keys=_keys(step)) + listed
-    there = _asked_there(seen, own, told) if seen.about.participant_keys else told
+    told = phrase("Enter what the participant says: {keys}.", keys=_keys(step))
+    there = (_asked_there(seen, own, told) if seen.about.participant_keys else told) + listed
     about = _order_told(seen, step) if step.later else ""
     return Instruction(title=isolated(step.text), detail="\n".join(filter(None, (about, there))), mood="ask")
 
