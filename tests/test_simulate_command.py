@@ -100,6 +100,22 @@ def test_a_dot_in_a_figures_name_that_begins_no_ending_stays(recoil, tmp_path):
     assert {path.stem for path in drawn} == {"plain", "run_1.12", "run_1.14"}
 
 
+@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
+@pytest.mark.parametrize("method", ["asymmetric-2", "vibration"])
+def test_a_figure_replaces_pictures_of_ours_alone(method, ending, recoil, tmp_path):
+    own, asked = tmp_path / "new" / "shot.png", {figure_files.ASKED: "1"}
+    for _ in range(2):
+        assert recoil("simulate", "--method", method, "--plot", own, **asked).returncode == 0
+    assert sorted(path.name for path in own.parent.iterdir()) == ["shot.pdf", "shot.png", "shot.svg"]
+
+    photo = own.with_suffix(ending)
+    photo.write_bytes(b"a photo of the lab")
+    done = recoil("simulate", "--method", method, "--plot", own, "--trace", tmp_path / "shot.csv")
+    assert (done.returncode, f"--plot {photo}: holds something else" in done.stderr) == (2, True)
+    assert photo.read_bytes() == b"a photo of the lab"
+    assert not (tmp_path / "shot.csv").exists()
+
+
 @pytest.mark.parametrize(("name", "said"), [("", "is a folder"), ("..", "is a folder"), (".png", "no name but")])
 def test_a_figure_needs_a_name(recoil, tmp_path, name, said):
     done = recoil("simulate", "--plot", f"{tmp_path}/{name}")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from analysis.report.section import PNG_DPI, PageHead, Section
+from analysis.report.section import PNG_DPI, REPORT_FILES, PageHead, Section
 from experiments.record.storage import write_whole
 
 _VERDICTS = (
@@ -24,7 +24,6 @@ _MARKDOWN_MARKS = re.compile(r"[\\`*|~]|<(?=[a-zA-Z/!?])|(?<![a-zA-Z0-9])_|_(?![
 _TIGHT = re.compile(r" (?=[=<>] [\d.−])|(?<= [=<>]) (?=[\d.−])|(?<=\d) (?=%)|(?<=% CI) (?=\[)|(?<=,) (?=[\d.]+[)\]])")
 """Spaces that no line may break at: around `=` and `<` before a number, before a percent sign, in brackets."""
 
-REPORT_FILES = ("report.html", "report.md")
 _BARE = PageHead()
 
 

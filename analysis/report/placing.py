@@ -13,7 +13,7 @@ from itertools import chain
 from pathlib import Path
 
 from analysis.report.copies import no_interrupt
-from analysis.report.page import REPORT_FILES
+from analysis.report.section import MAKER, REPORT_FILES
 from analysis.report.terminal import say
 from device.words import RecoilError, first_few
 from experiments.record import storage
@@ -165,6 +165,25 @@ def _folder_held(folder: Path) -> Iterator[bool]:
         yield storage.hold(descriptor)
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def files_in(folder: Path) -> Iterator[Path]:
+    """An empty folder to fill; at the end its files stand in `folder`, all of them, and after an error none does."""
+    storage.make_folder(folder)
+    with _part(folder, ".part-") as part, _errors_name(folder, part):
+        yield part
+        with no_interrupt():
+            _move_files(part, folder)
+
+
+_SAID = [f"Software\0{MAKER}".encode(), f"<dc:title>{MAKER}</dc:title>".encode(), f"/Creator ({MAKER})".encode()]
+
+
+def is_own_picture(path: Path) -> bool:
+    """Does a file say that it is a picture of ours, PNG, SVG or PDF?"""
+    content = path.read_bytes()
+    return any(said in content for said in _SAID)
 
 
 def is_free(target: Path) -> bool:

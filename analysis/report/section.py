@@ -16,6 +16,10 @@ SHOWN = 50
 """So many of it are left."""
 PNG_DPI = 200
 """Points of an inch of a picture."""
+MAKER = "Recoil"
+"""Who made it, as our pictures say."""
+REPORT_FILES = ("report.html", "report.md")
+"""What a page is written as."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

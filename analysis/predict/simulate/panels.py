@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.predict.simulate.shot import FULL_MODEL, VIBRATION_POINTS, in_words
 from analysis.report.figures.shot import ShotPanel, VibrationPanel, figure_5, figure_vibration
+from analysis.report.placing import files_in
 from device.parameters import GunParameters
 from device.physics import ShotSummary, trace
 from device.vibration import Vibration, VibrationParameters, solved
@@ -59,7 +60,8 @@ def write_plot(parameters: GunParameters, stem: Path, of: str) -> None:
     title = f"{friction}, coil {parameters.drive_off} after the pulse"
     panel = shot_panel("\n".join(textwrap.wrap(title, _TITLE_WIDTH)), parameters)
     _check_drawable(panel)
-    figure_5([replace(panel, options=f"{of}; {FULL_MODEL}: {_options(parameters)}")], stem)
+    with files_in(stem.parent) as part:
+        figure_5([replace(panel, options=f"{of}; {FULL_MODEL}: {_options(parameters)}")], part / stem.name)
 
 
 def _check_drawable(panel: ShotPanel) -> None:
@@ -78,7 +80,9 @@ def _options(parameters: GunParameters | VibrationParameters) -> str:
 def write_vibration_plot(parameters: VibrationParameters, stem: Path, of: str) -> None:
     """The vibration over time, with all that it was made with, as PNG, SVG and PDF. `of` names gun and method."""
     panel = _vibration_panel(parameters, solved(parameters))
-    figure_vibration(replace(panel, options=f"{of}; dotted: the envelope. {_options(parameters)}"), stem)
+    options = f"{of}; dotted: the envelope. {_options(parameters)}"
+    with files_in(stem.parent) as part:
+        figure_vibration(replace(panel, options=options), part / stem.name)
 
 
 def _vibration_panel(parameters: VibrationParameters, vibration: Vibration) -> VibrationPanel:

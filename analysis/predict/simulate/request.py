@@ -62,6 +62,12 @@ class SimulateRequest:
         return self.plot.with_suffix("") if self.plot.suffix.lower() in FIGURE_ENDINGS else self.plot
 
     @property
+    def figures(self) -> list[Path]:
+        """The files of the figure. `ConfigError` as `plot_stem`."""
+        stem = self.plot_stem
+        return [] if stem is None else [stem.with_name(f"{stem.name}{ending}") for ending in FIGURE_ENDINGS]
+
+    @property
     def of_one_shot(self) -> list[str]:
         """The options given that tell more of a single shot of a coil."""
         options = {

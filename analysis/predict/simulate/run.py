@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from analysis.predict.simulate.request import FIGURE_ENDINGS, ModelRequest, SimulateRequest
+from analysis.predict.simulate.request import ModelRequest, SimulateRequest
 from analysis.predict.simulate.scene import picked, with_contact
 from analysis.predict.simulate.shot import (
     FULL_MODEL,
     SimulatedShot,
     SimulatedVibration,
+    check_own,
     collision_with_stop,
     in_hand,
     method_of,
@@ -23,6 +24,7 @@ from analysis.predict.simulate.shot import (
     write_trace,
 )
 from analysis.predict.simulate.shot import sections as shot_sections
+from analysis.report.placing import is_own_picture
 from analysis.report.section import Section
 from analysis.report.terminal import Progress
 from device.parameters import GunParameters
@@ -42,6 +44,8 @@ AnySimulated: TypeAlias = "SimulatedShot | SimulatedVibration | Sweep"
 def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str], None]) -> AnySimulated:
     """What was asked for; trace, figure and table are written. `ConfigError` for whatever cannot be."""
     stem, config = request.plot_stem, load_gun(find(request.gun))
+    for path in request.figures:
+        check_own("--plot", path, is_own_picture)
     of = f"{Path(request.gun).name}, {method_of(config, request.method)}"
     rendering = config.rendering(request.method) if request.method in config.methods else None
     if isinstance(rendering, VibrationParameters):
@@ -114,7 +118,7 @@ def _tell_files(request: SimulateRequest, stem: Path | None, tell: Callable[[str
     if request.trace:
         tell(f"Trace: {request.trace}")
     if stem:
-        tell("Figure: " + ", ".join(f"{stem}{ending}" for ending in FIGURE_ENDINGS))
+        tell("Figure: " + ", ".join(map(str, request.figures)))
 
 
 def _tell_model(request: SimulateRequest, fidelity: str, tell: Callable[[str], None]) -> None:

@@ -22,7 +22,7 @@ from matplotlib.text import Text
 from analysis.report.copies import in_copy
 from analysis.report.figures.glyphs import OWN_FONT, give_fonts, is_drawable
 from analysis.report.labels import cut_names, display_name, lines_of, some_labels, text_columns
-from analysis.report.section import PNG_DPI
+from analysis.report.section import MAKER, PNG_DPI
 from experiments.record.storage import errors_name
 
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
@@ -79,19 +79,19 @@ def panel_grid(figure: Figure, titles: Sequence[str], across: int) -> list[Axes]
 
 
 def save(figure: Figure, path_stem: Path) -> None:
-    """`path_stem`.png, .svg and .pdf, without dates or versions inside. Folders are made."""
+    """`path_stem`.png, .svg and .pdf, with who made them inside, but no dates or versions. Folders are made."""
     path_stem.parent.mkdir(parents=True, exist_ok=True)
     png, svg, pdf = (path_stem.with_name(f"{path_stem.name}.{kind}") for kind in ("png", "svg", "pdf"))
     lay_out(figure)
     canvas: Any = figure.canvas
-    no_program: Any = {"Software": None}
+    program: Any = {"Software": MAKER}
     with errors_name(path_stem):
-        imsave(png, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=no_program)
+        imsave(png, canvas.buffer_rgba(), format="png", dpi=PNG_DPI, metadata=program)
         canvas = FigureCanvasSVG(figure)
-        canvas.print_svg(svg, metadata={"Date": None, "Creator": None})
+        canvas.print_svg(svg, metadata={"Date": None, "Creator": MAKER})
         canvas = FigureCanvasPdf(figure)
         with _letters_without_shaping():
-            canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+            canvas.print_pdf(pdf, metadata={"CreationDate": None, "Creator": MAKER, "Producer": None})
 
 
 @contextmanager
