@@ -168,6 +168,15 @@ def test_beyond_the_devices_limits_nothing_is_proposed(result: tuple[Path, Desig
     assert "voltage above 24 V" in in_text(feature.in_short(result[1]))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("error_V", "is_said"), [(0.06, True), (0.04, False)])
+def test_bands_that_are_seen_to_lie_elsewhere_than_their_voltages_say_so(
+    error_V: float, is_said: bool, result: tuple[Path, DesignSearch]
+) -> None:
+    found = replace(result[1], critical=replace(result[1].critical, interpolation_error_V=error_V))
+    assert ("Bands are interpolated on the grid" in in_text(feature.in_short(found))) == is_said
+
+
 @pytest.mark.soak
 def test_without_a_design_to_propose_it_says_so_and_ends_with_1(recoil: Recoil, tmp_path: Path) -> None:
     words = ("--friction", "1.3-1.38", "--voltage", "10-12", "--pulse", "0.01", "--grid", 4, "--workers", 1)

@@ -55,8 +55,16 @@ def _said(critical: Critical, level: str) -> Iterator[str]:
     reached = [last for last, word in zip(critical.lasting, critical.reached, strict=True) if word == REACHED]
     if reached and not all(reached):
         yield f"At {reached.count(False)} frictions a higher voltage of the sweep falls below {level} again."
-    if (error := critical.interpolation_error_V) is not None:
-        yield f"Band and other lines are interpolated on the grid, the line is solved: at most {error:.2g} V apart."
+    if critical.interpolation_error_V is not None:
+        yield f"Band and other lines are interpolated on the grid, the line is solved: {_apart(critical)}."
+
+
+def _apart(critical: Critical) -> str:
+    return f"at most {critical.interpolation_error_V:.2g} V apart"
+
+
+_SEEN_V = 0.05
+"""Voltages are shown to a tenth."""
 
 
 def _contour_table(found: DesignSearch) -> Table:
@@ -123,6 +131,8 @@ def _lines(found: DesignSearch) -> Iterator[str]:
     right = f"{apa.percent(critical.level, 0)} are right, at a pulse of {_ms(critical.pulse_s)}"
     for one in (own for own in found.own if own.swept):
         yield f"{right}: {_at_friction(critical, one.friction_N, 'from ')} at {one.friction_N:g} N ({one.name})."
+    if (critical.interpolation_error_V or 0.0) >= _SEEN_V:
+        yield f"Bands are interpolated on the grid, voltages are solved: {_apart(critical)}; --grid brings them together."
 
 
 def _best(found: DesignSearch) -> Section:
