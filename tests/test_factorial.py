@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 from statsmodels.stats.anova import AnovaRM
 
-from analysis.stats.anova import rm_anova
+from analysis.stats.anova import F_UNDEFINED, NO_ERROR, rm_anova
 from analysis.stats.factorial import factorial_anova
 
 
@@ -30,6 +30,35 @@ def test_two_factors_within_people_are_those_of_statsmodels():
     assert [effect.df for effect in found] == [*zip(theirs["Num DF"], theirs["Den DF"], strict=True)]
     assert [effect.p for effect in found] == pytest.approx(list(theirs["Pr > F"]), rel=1e-8)
     assert all(0 < effect.size < 1 for effect in found)
+
+
+OFFSETS = [0.0, 0.3, 1e6]
+SCALES = [1.0, 0.1, 1e200, 1e-200]
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("people", [6, 14])
+def test_rounding_is_no_effect(people, scale, offset):
+    same = scale * (np.full((people, 3), 4.0) + offset)
+    groups = ["one", "two"] * (people // 2)
+    for effect in factorial_anova(same, ["grip", "method"], groups):
+        assert (np.isnan([effect.F, effect.p, effect.size]).all(), effect.reason) == (True, F_UNDEFINED)
+
+    own = np.random.default_rng(people).integers(1, 7, people)[:, None, None]
+    scores = scale * (own + np.array([0.0, 1.0])[:, None] + np.zeros(3) + offset)
+    damper, voltage, both = factorial_anova(scores, ["damper", "voltage"])
+    assert (damper.F, damper.p, damper.reason) == (np.inf, 0.0, NO_ERROR)
+    assert 0 < damper.size < 1
+    assert {voltage.reason, both.reason} == {F_UNDEFINED}
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_no_f_hangs_on_the_scale(scale):
+    scores = drawn(9, 2, 4)
+    found, scaled = (factorial_anova(one, ("damper", "voltage")) for one in (scores, scale * scores))
+    assert [one.F for one in scaled] == pytest.approx([one.F for one in found], rel=1e-9)
+    assert not any(one.reason for one in found)
 
 
 def test_a_factor_with_two_levels_needs_no_correction():

@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy import stats
 from statsmodels.genmod.cov_struct import Independence
 from statsmodels.genmod.families import Binomial
 from statsmodels.genmod.generalized_estimating_equations import GEE
 
-from analysis.stats.logit_model import NO_SPREAD, logit_model
+from analysis.stats.logit_model import NO_SPREAD, TOO_FEW_WAYS, logit_model
 from analysis.stats.paired import holm
 from tests.made_scores import RIGHT
 
@@ -98,6 +100,23 @@ def test_conditions_near_the_ceiling_are_named() -> None:
 def test_people_without_spread_give_a_reason() -> None:
     assert logit_model(np.tile([5, 7, 9], (6, 1)), np.full((6, 3), 10), LABELS).reason == NO_SPREAD
     assert "fewer than two participants" in str(logit_model(RIGHT[:1], TEN[:1], LABELS).reason)
+
+
+@pytest.mark.parametrize("people", [4, 6, 13])
+@pytest.mark.parametrize("others", [[10, 10, 10], [9, 9, 9]])
+def test_one_person_alone_is_no_spread_to_test_against(others: list[int], people: int) -> None:
+    found = logit_model([[6, 5, 3], *[others] * (people - 1)], np.full((people, 3), 10), LABELS)
+    assert (found.reason, len(found.contrasts), found.test) == (TOO_FEW_WAYS, 0, None)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_joint_test_is_one(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    people, off = int(rng.integers(3, 15)), int(rng.integers(1, 4))
+    right = np.full((people, int(rng.integers(2, 5))), 10)
+    right[:off] = rng.integers(2, 10, right[:off].shape)
+    test = logit_model(right, np.full_like(right, 10)).test
+    assert test is None or (0 <= test.F < 1e6 and 0 <= test.p <= 1)
 
 
 def test_two_people_have_contrasts_but_no_overall_test_of_three() -> None:

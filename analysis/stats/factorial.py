@@ -11,15 +11,18 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from analysis.stats.anova import F_UNDEFINED, NO_ERROR
 from analysis.stats.arrays import FloatArray, in_brief, row_labels
 from analysis.stats.frames import Result, Results, ScoreTable, named_scores
+from analysis.stats.sums_of_squares import NOISE, exponent_of, scale, without_noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FactorialEffect(Result):
     """One effect. `source` names its factors; `p_gg` is corrected by `epsilon` (Greenhouse and Geisser) within people.
 
-    `size` is generalised eta squared, of factors that are all manipulated.
+    `size` is generalised eta squared, of factors that are all manipulated. As in `Anova`, an error no larger than
+    rounding makes is none: F is infinite, or NaN if the effect is none either; `reason` says which.
     """
 
     source: tuple[str, ...]
@@ -30,6 +33,11 @@ class FactorialEffect(Result):
     p_gg: float | None
     size: float
 
+    @property
+    def reason(self) -> str:
+        """Why F is infinite or undefined, empty if it is neither."""
+        return F_UNDEFINED if math.isnan(self.F) else NO_ERROR if math.isinf(self.F) else ""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stratum:
@@ -38,6 +46,7 @@ class _Stratum:
     factors: tuple[int, ...]
     parts: list[FloatArray]
     left: float
+    noise: float
 
     @property
     def df(self) -> int:
@@ -81,7 +90,7 @@ def factorial_anova(
     >>> [effect.source for effect in factorial_anova([[[1, 2], [2, 4]], [[1, 3], [2, 2]]], ["damper", "voltage"])]
     [('damper',), ('voltage',), ('damper', 'voltage')]
     """
-    array = named_scores(scores, "scores")[0]
+    array = _unit_scaled(named_scores(scores, "scores")[0])
     factors = list(map(str, row_labels(names, "names")))
     within = factors if group is None else factors[1:]
     if array.ndim != 1 + len(within) or min(array.shape) < 2:
@@ -107,6 +116,14 @@ def factorial_anova(
     return Results(found)
 
 
+def _unit_scaled(scores: FloatArray) -> FloatArray:
+    """The scores within -1..1, by a power of two: no F hangs on it, and no square leaves the range of floats."""
+    scaled = scores.copy()
+    if scaled.size:
+        scale(scaled, exponent_of(np.max(np.abs(scaled))))
+    return scaled
+
+
 def _subsets(count: int) -> Iterator[tuple[int, ...]]:
     """The factors of each effect, none first: main effects, then interactions of two, and so on."""
     return chain.from_iterable(combinations(range(count), size) for size in range(count + 1))
@@ -123,13 +140,18 @@ def _stratum(scores: FloatArray, groups: NDArray[np.str_], factors: tuple[int, .
         contrasts = np.asarray(np.kron(contrasts, part), dtype=np.float64)
     values = scores.reshape(len(scores), -1) @ contrasts.T
     own = [values[groups == one] for one in np.unique(groups)]
-    return _Stratum(factors=factors, parts=own, left=float(sum(((one - one.mean(axis=0)) ** 2).sum() for one in own)))
+    left = float(sum(((one - one.mean(axis=0)) ** 2).sum() for one in own))
+    cells = math.prod(scores.shape[1:])  # a contrast rounds once for each
+    return _Stratum(factors=factors, parts=own, left=left, noise=NOISE**2 * cells * float((scores**2).sum()))
 
 
 def _effect(source: tuple[str, ...], stratum: _Stratum, explained: float, df: int, all_left: float) -> FactorialEffect:
-    df_error, left = stratum.df_error, stratum.left
-    F = explained / df / (left / df_error) if left > 0 else math.nan
-    epsilon = stratum.epsilon if stratum.factors else None
+    df_error = stratum.df_error
+    squares = (np.array(value) for value in (explained, stratum.left, stratum.noise))
+    explained, left = map(float, without_noise(*squares))
+    without_error = math.inf if explained > 0 else math.nan
+    F = explained / df / (left / df_error) if left > 0 else without_error
+    epsilon = (stratum.epsilon if left > 0 else math.nan) if stratum.factors else None
     return FactorialEffect(
         source=source,
         F=F,
@@ -137,5 +159,5 @@ def _effect(source: tuple[str, ...], stratum: _Stratum, explained: float, df: in
         p=float(scipy.stats.f.sf(F, df, df_error)),
         epsilon=epsilon,
         p_gg=None if epsilon is None else float(scipy.stats.f.sf(F, epsilon * df, epsilon * df_error)),
-        size=explained / (explained + all_left) if explained + all_left > 0 else math.nan,
+        size=explained / (explained + all_left) if explained + all_left > stratum.noise else math.nan,
     )

@@ -93,6 +93,12 @@ MODEL_NOTE = (
     "iteration can fail to converge."
 )
 NO_SPREAD = "Two conditions differ alike in every participant: without spread there is nothing to test against."
+TOO_FEW_WAYS = (
+    "Over the conditions participants differ in fewer ways than there are conditions, as where all but one or two are "
+    "always right: there is too little spread to test against."
+)
+_ALIKE = 1e-6
+"""Relative: a spread below this part of the largest is rounding."""
 FEW = 5
 """Right or wrong answers in a condition below which Wald tests of log odds are known to fail (Hauck & Donner 1977)."""
 
@@ -162,7 +168,8 @@ def logit_model(
 
     `successes, trials`: (n people, k conditions), every cell with a trial, k >= 2; else `ValueError`. The conditions
     have the labels, or else the names of the columns of `successes`, or numbers.
-    No fit (`reason`): a condition all right or all wrong (separation), one person, no spread between people.
+    No fit (`reason`): a condition all right or all wrong (separation), one person, no spread between people, or in
+    fewer ways than contrasts.
     Sources: Liang & Zeger 1986, Biometrika 73, 13; Mancl & DeRouen 2001, Biometrics 57, 126.
 
     >>> found = logit_model({"A": [3, 5, 4], "B": [8, 6, 9]}, {"A": [10, 10, 10], "B": [10, 10, 10]})
@@ -187,6 +194,8 @@ def logit_model(
     contrasts = _contrasts(log_odds, covariance, (len(y) - 1, confidence), labels)
     if contrasts is None:
         return LogitModel(reason=NO_SPREAD)
+    if len(y) > len(labels) - 1 > _ways(influence):
+        return LogitModel(reason=TOO_FEW_WAYS)
     return LogitModel(
         conditions=_conditions(log_odds, covariance, (len(y) - 1, confidence), labels),
         contrasts=contrasts,
@@ -239,13 +248,19 @@ def _contrasts(
     )
 
 
+def _ways(influence: FloatArray) -> int:
+    """In how many independent ways people differ over the conditions: the rank of their parts in the contrasts."""
+    parts = influence[:, 1:] - influence[:, :1]
+    return int(np.linalg.matrix_rank(parts / np.linalg.norm(parts, axis=0), tol=_ALIKE * math.sqrt(parts.shape[1])))
+
+
 def _equal_odds(log_odds: FloatArray, covariance: FloatArray, people: int) -> EqualOdds | None:
-    """Hotelling's F = (n - k + 1) / ((n - 1)(k - 1)) d'V^-1 d of the contrasts d; None if V is singular."""
+    """Hotelling's F = (n - k + 1) / ((n - 1)(k - 1)) d'V^-1 d of the contrasts d; None of too few people."""
     q = len(log_odds) - 1
+    if people <= q:
+        return None
     against_first = np.column_stack([-np.ones(q), np.eye(q)])
     difference, V = against_first @ log_odds, against_first @ covariance @ against_first.T
-    if people <= q or int(np.linalg.matrix_rank(V)) < q:
-        return None
     df = (q, people - q)
     F = float(difference @ np.linalg.solve(V, difference)) * df[1] / ((people - 1) * q)
     return EqualOdds(F=F, df=df, p=float(scipy.special.fdtrc(*df, F)))

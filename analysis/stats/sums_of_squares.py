@@ -79,7 +79,7 @@ def pairwise(values: FloatArray) -> FloatArray:
     return total
 
 
-_NOISE = 2.0 * float(np.finfo(np.float64).eps)
+NOISE = 2.0 * float(np.finfo(np.float64).eps)
 """Relative error of a number that a few operations on decimals have made: four roundings of half an eps."""
 
 _CERTAIN = 2.0**40
@@ -131,7 +131,7 @@ def repeated_sums(scores: FloatArray) -> Sums:
     exponent, totals, effect, people, error, noise = (
         np.concatenate(parts, axis=-1) for parts in zip(*blocks, strict=True)
     )
-    effect, error = _without_noise(effect, error, noise)
+    effect, error = without_noise(effect, error, noise)
     return Sums(
         exponent=exponent.reshape(leading),
         totals=np.moveaxis(totals, 1, -1).reshape(3, *leading, k),
@@ -166,7 +166,7 @@ def _decomposed(sets: FloatArray) -> _Parts:
     slices -= rows[:, :, None]
     slices -= effects[:, None]
     error = pairwise(np.square(_joined(slices)).reshape(flat.shape)) / float((n * k) ** 2)
-    noise = _NOISE**2 * pairwise(np.square(flat))
+    noise = NOISE**2 * pairwise(np.square(flat))
     return exponent, columns, effect / float(n * k**2), people / float(n**2 * k), error, noise
 
 
@@ -184,8 +184,8 @@ def between_sums(groups: Sequence[FloatArray]) -> Sums:
     slices = [part - slices[0][..., :1] for part in slices]
     counts = np.array([group.shape[-1] for group in groups], dtype=np.float64)
     totals = np.stack([part.sum(axis=-1) for part in slices], axis=-1)
-    noise = _NOISE**2 * np.sum([np.square(group).sum(axis=-1) for group in scaled], axis=0)
-    effect, error = _without_noise(
+    noise = NOISE**2 * np.sum([np.square(group).sum(axis=-1) for group in scaled], axis=0)
+    effect, error = without_noise(
         _between_effect(totals, counts), np.sum([_spread(part) for part in slices], axis=0), noise
     )
     return Sums(
@@ -217,7 +217,8 @@ def _spread(slices: FloatArray) -> FloatArray:
     return spread
 
 
-def _without_noise(effect: FloatArray, error: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+def without_noise(effect: FloatArray, error: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Effect and error with what is no more than `noise` set to 0, as the head of this module says."""
     nothing = (error <= noise) & (effect <= noise)
     certain = (error <= noise) & (effect >= _CERTAIN * noise)
     return np.where(nothing, 0.0, effect), np.where(nothing | certain, 0.0, error)

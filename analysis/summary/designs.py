@@ -351,12 +351,16 @@ def _factorial(names: Sequence[str], people: pd.DataFrame, group: pd.Series | No
         return
     scores = people.to_numpy(dtype=np.float64).reshape(len(people), *_sizes(people))
     for one in factorial_anova(scores, named, groups):
-        effect = " × ".join(one.source)
-        if math.isnan(one.F):
-            yield DesignTest(name="anova", effect=effect, reason="people do not differ in it, so there is no error")
-        else:
-            test = DesignTest(name="anova", effect=effect, statistic=one.F, df=one.df, p=one.p, size=one.size)
-            yield _corrected(test, one)
+        test = DesignTest(
+            name="anova",
+            effect=" × ".join(one.source),
+            statistic=one.F,
+            df=one.df,
+            p=one.p,
+            size=one.size,
+            reason=one.reason or None,
+        )
+        yield test if one.reason else _corrected(test, one)
 
 
 def _corrected(test: DesignTest, effect: FactorialEffect) -> DesignTest:

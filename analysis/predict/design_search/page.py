@@ -132,7 +132,7 @@ def _lines(found: DesignSearch) -> Iterator[str]:
     for one in (own for own in found.own if own.swept):
         yield f"{right}: {_at_friction(critical, one.friction_N, 'from ')} at {one.friction_N:g} N ({one.name})."
     if (critical.interpolation_error_V or 0.0) >= _SEEN_V:
-        yield f"Bands are interpolated on the grid, voltages are solved: {_apart(critical)}; --grid brings them together."
+        yield f"Bands are interpolated on the grid, voltages are solved: {_apart(critical)}; less with more of --grid."
 
 
 def _best(found: DesignSearch) -> Section:

@@ -175,8 +175,7 @@ def _model_words(model: NamedModel) -> str:
     test = (
         f"Equal odds of all methods: {apa.f_test(equal.F, equal.df, equal.p)}. "
         if equal
-        else "No joint test of equal odds: it takes as many people as methods, and no two methods that differ alike in "
-        "everybody. "
+        else "No joint test of equal odds: it takes as many people as methods. "
     )
     return f"Model of the forward answers: {model.name}. {test}{model.note}"
 
