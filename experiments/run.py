@@ -6,7 +6,7 @@ import hashlib
 import os
 import shlex
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -103,7 +103,9 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     before = _before(place, request, clock)
     if before is None:
         _refuse_excluded(place, registered)
-    with _open_gun(request, stimuli, clock) as gun:
+    with _open_gun(request, stimuli, clock) as gun, ExitStack() as turn:
+        if before is None:
+            turn.enter_context(_own_turn(place, setup.config))
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
         stimuli.work_out(plan.trials)
         told: GrowingHistory = []
@@ -116,6 +118,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             head = _circumstances(request, gun, clock)
             if before is None:
                 position = _begin(session, journal, request, plan, head)
+                turn.close()
             else:
                 position = _resume(session, journal, before, head, told)
             live = LiveRun(
@@ -263,6 +266,29 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
             f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
             "one finished run a participant and experiment, so use another code"
         )
+
+
+_TURN_S = 20.0
+"""So long a run waits for another one that begins; with a sensor and a participant's screen that takes some seconds."""
+
+
+@contextmanager
+def _own_turn(place: Place, config: DesignConfig) -> Iterator[None]:
+    """Keep others from beginning a run here: which row of the order it gets hangs on the journals of those before it.
+
+    `PlaceError`: somebody else has been beginning one for too long.
+    """
+    if place.practice or not balance.is_balanced(config):
+        yield
+        return
+    storage.make_folder(place.results)
+    with storage.folder_held(place.results, _TURN_S) as is_ours:
+        if not is_ours:
+            raise PlaceError(
+                f"{place.results}: another console has been beginning a run here for {_TURN_S:g} s, and the order of "
+                "this one hangs on that; see to it, and begin again"
+            )
+        yield
 
 
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:

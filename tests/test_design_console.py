@@ -12,6 +12,7 @@ from experiments.screens.console.participant_link import check_own_keys
 from experiments.study.folders import PlaceError
 from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import words
+from tests.designs import changed
 
 pytest.importorskip("PyQt6")
 pytestmark = [pytest.mark.slow, needs_display]
@@ -162,6 +163,38 @@ def test_keys_of_the_participants_own_that_are_the_consoles_are_refused(configs:
     design.write_text(design.read_text().replace('keys = { first = "left", second = "right" }', ""))
     with pytest.raises(PlaceError, match=r"tiny.toml: questions.stronger: d, r would .* keys = \{ first = \"left"):
         check_own_keys(load_setup(str(design)))
+
+
+@pytest.mark.parametrize(
+    ("keys", "others", "rates", "why"),
+    [
+        ("1 2", {"how": ("choice", "left right")}, False, ""),
+        ("left right", {"how": ("choice", "f b")}, False, r"questions.how: f, b would be a key of the console"),
+        ("1 2", {"much": ("rating", "")}, False, r"questions.response: 1, 2 would be typed .* for questions.much as"),
+        ("1 2", {"much": ("rating", "")}, True, ""),
+        ("1 2", {"much": ("number", "")}, True, r"questions.response: 1, 2 would be typed .* for questions.much as"),
+        ("j k", {"words": ("text", "")}, False, r"questions.response: j, k would be typed"),
+        ("left right", {"much": ("rating", ""), "words": ("text", "")}, False, ""),
+    ],
+)
+def test_own_keys_are_held_against_all_that_the_console_takes(
+    keys: str, others: dict[str, tuple[str, str]], rates: bool, why: str
+) -> None:
+    def asked(kind: str, keys: str) -> dict[str, object]:
+        shared = {"kind": kind, "text": "How was it?"}
+        if kind == "rating":
+            return shared | {"minimum": 0, "maximum": 10, "grain": 1}
+        named = dict(zip(("hard", "weak"), keys.split(), strict=False))
+        return shared | ({"answers": ("hard", "weak"), "keys": named} if named else {})
+
+    response = {"keys": dict(zip(("forward", "backward"), keys.split(), strict=True))}
+    more = {name: asked(*about) for name, about in others.items()}
+    setup = changed("direction", questions={"response": response, **more})
+    if not why:
+        check_own_keys(setup, rates=rates)
+        return
+    with pytest.raises(PlaceError, match=why):
+        check_own_keys(setup, rates=rates)
 
 
 RANKED = """

@@ -178,6 +178,15 @@ def test_a_gun_that_does_not_answer_is_not_fired_until_it_does(tmp_path: Path) -
         assert by_hand(sitting, events.Fire())
 
 
+def test_nor_is_the_test_shot_after_an_emergency_stop(tmp_path: Path) -> None:
+    with sat_at(S.REARMING, tmp_path) as sitting:
+        sitting.live.gun_silence = "the gun is not there."
+        refused = by_hand(sitting, events.Rearm(held_s=1.0))
+        assert refused == EventVerdict(taken=False, text="See to the gun first: the gun is not there.")
+        sitting.live.gun_silence = ""
+        assert by_hand(sitting, events.Rearm(held_s=1.0))
+
+
 def test_next_is_taken_from_the_least_exposure_on_and_not_before_the_first_shot(tmp_path: Path) -> None:
     with sat(PREFERENCE, tmp_path) as sitting:
         sitting.to(S.PREPARING)
@@ -237,6 +246,43 @@ def test_a_key_counts_if_it_went_down_after_the_onset(tmp_path: Path) -> None:
     assert float(rows[0]["response_time_s"]) == pytest.approx(0.05)
     assert rows[0]["flags"] == "anticipation"
     assert [remark.by for remark in remarks(contents, Refused)] == ["participant"]
+
+
+HOW = {"kind": "choice", "text": "How was it?", "answers": ("hard", "weak")}
+
+
+def answers_from(sitting: Sitting, response: str, before_s: tuple[float, ...]) -> None:
+    """A key counts from the guard time after the question on: none that went down before it, or just after."""
+    sitting.settle()
+    assert sitting.position.state is S.ASKING
+    from_s = sitting.position.keys_from_s + GUARD_S
+    sitting.clock.skip(2 * GUARD_S)
+    for at_s in (*before_s, from_s - 2 * GUARD_S, from_s - GUARD_S, from_s - 0.001):
+        early = sitting.live.offer(own_key(sitting, response=response, at_s=at_s))
+        assert early == EventVerdict(taken=False, text="It went down before the question, or in a pause.")
+    assert sitting.live.offer(own_key(sitting, response=response, at_s=from_s))
+
+
+@pytest.mark.parametrize("when", ["trial", "block"])
+def test_the_key_of_one_question_answers_no_other(when: str, tmp_path: Path) -> None:
+    with sat(changed("direction", questions={"how": HOW | {"when": when}}), tmp_path) as sitting:
+        first_s = ()
+        while sitting.state is not S.ASKING or sitting.position.step.question != "how":
+            sitting.to(S.ASKING)
+            answered = own_key(sitting)
+            first_s = (sitting.position.onset_s, answered.at_s)
+            assert sitting.live.offer(answered)
+            sitting.settle()
+        answers_from(sitting, "weak", first_s)
+
+
+def test_a_key_in_a_train_answers_nothing(tmp_path: Path) -> None:
+    with sat(changed("preference", questions={"how": HOW}), tmp_path) as sitting:
+        sitting.to(S.TRAIN)
+        onset_s = sitting.position.onset_s
+        assert onset_s is not None
+        sitting.go_on()
+        answers_from(sitting, "weak", (onset_s, onset_s + 1.0))
 
 
 def test_no_key_passes_through_a_pause_also_if_it_arrives_afterwards(tmp_path: Path) -> None:

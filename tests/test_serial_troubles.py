@@ -14,6 +14,7 @@ from device import LimitError, LinkError
 from device.limits import DriveHistory
 from device.serial_gun.lines import Disconnected, SerialPort
 from device.serial_gun.link import KEEP_ALIVE_S, WATCHDOG_S, Link
+from device.serial_gun.triggering import ARM_WITHIN_S
 from device.twin.twin import BUSY_US
 from device.wire.errors import WireError, message
 from device.wire.records import Frame, encode
@@ -191,6 +192,20 @@ def test_unplugged_between_shots_it_goes_on_after_replugging(tmp_path, tcp):
         pair.ready()
         pair.gun.fire(a_shot())
         assert len(pair.twin.body.ledger) == 2
+
+
+def test_a_gun_that_comes_back_late_is_not_armed_by_what_was_pressed_before(tmp_path):
+    with a_pair(tmp_path, Troubles(replug_s=1.2 * ARM_WITHIN_S), speed=1.0) as pair:
+        pair.ready()
+        pair.twin.order(pair.twin.unplug)
+        wait_for(lambda: not is_up(pair.gun))
+        with pytest.raises(Disconnected, match=r"not armed: the gun was gone for more than 1 s"):
+            pair.gun.arm()
+        assert pair.gun.status().state == "disarmed"
+        assert pair.twin.body.ledger == []
+        pair.ready()
+        pair.gun.fire(a_shot())
+        assert len(pair.twin.body.ledger) == 1
 
 
 def test_a_connection_whose_other_end_has_gone_is_closed_all_the_same():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import threading
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,11 @@ from experiments.config.door import ConfigError, EligibilityConfig, Handedness, 
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.live_run import Screen
 from experiments.load import load_setup, load_study, shipped_folder
+from experiments.run import Finished, MakeScreen, run
+from experiments.run_request import RunRequest
+from experiments.screens.synthetic import synthetic_screen
 from experiments.study.balance import row_of_next_run, used_rows
 from experiments.study.folders import place
 from experiments.study.register import append, entry, read_register
@@ -33,7 +38,7 @@ from experiments.study.study import (
     unasked,
     who_is_next,
 )
-from tests.designs import changed
+from tests.designs import changed, direction_with
 from tests.journals import write_head
 
 PAPER = load_study("study")[0].eligibility
@@ -284,6 +289,29 @@ def test_a_drop_out_gives_the_row_back_and_a_readmitted_one_takes_it_again(tmp_p
     assert row_of_next_run(setup, tmp_path, read_register(tmp_path)) == 1
     append(tmp_path, entry("readmitted", "P02", reason="came back"), VirtualClock())
     assert used_rows(tmp_path, "preference", read_register(tmp_path)) == [0, 1, 2]
+
+
+def test_two_consoles_that_begin_at_once_get_rows_of_their_own(tmp_path: Path) -> None:
+    setup, other_stands = direction_with(order={"sessions": "williams"}), threading.Event()
+
+    def begun(code: str, make_screen: MakeScreen) -> Finished:
+        asked = RunRequest(setup=setup, participant_id=code, results=tmp_path, seed=1)
+        return run(asked, make_screen, VirtualClock())
+
+    def stands(*about: Any) -> Screen:
+        other_stands.set()
+        return synthetic_screen(*about)
+
+    def second_begins_meanwhile(*about: Any) -> Screen:
+        other.start()
+        other_stands.wait(0.5)  # it does not, as its row hangs on ours
+        return synthetic_screen(*about)
+
+    found: list[Finished] = []
+    other = threading.Thread(target=lambda: found.append(begun("P02", stands)))
+    found.append(begun("P01", second_begins_meanwhile))
+    other.join()
+    assert {one.plan.participant_id: one.plan.order_row for one in found} == {"P01": 0, "P02": 1}
 
 
 def test_a_random_order_has_no_rows(tmp_path: Path) -> None:

@@ -268,6 +268,31 @@ def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp
     assert [one["kind"] for one in journal_of(tmp_path) if one["kind"] == "stopped"] == ["stopped"]
 
 
+@pytest.mark.parametrize("typed", ["fo!", "stop!", "\x1b[24~", "note it\x1b[24~"])
+def test_what_was_half_typed_does_not_swallow_an_emergency_stop(
+    typed: str, quick_configs: Path, tmp_path: Path
+) -> None:
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.answer_trials(1)
+        screen.wait_for(FIRES, 2)
+        screen.type(typed)
+        screen.wait_for("EMERGENCY STOP.")
+        screen.type("")
+        assert screen.end() == 130
+    assert len(bodies(tmp_path, "fired")) == 1
+
+
+def test_a_mark_within_words_is_a_mark(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.answer_trials(1)
+        screen.wait_for(FIRES, 2)
+        screen.type("note that was loud!")
+        screen.wait_for("Saved. Note.")
+        screen.type("stop")
+        assert screen.end() == 130
+    assert [one["text"] for one in bodies(tmp_path, "noted")] == ["that was loud!"]
+
+
 def test_after_an_emergency_stop_nothing_fires_and_a_resumed_run_begins_with_a_test_shot(
     quick_configs: Path, tmp_path: Path
 ) -> None:

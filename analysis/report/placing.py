@@ -138,7 +138,7 @@ def _part(folder: Path, prefix: str) -> Iterator[Path]:
     What a command that was killed left there is taken away first; one that is at work holds its own.
     """
     for left_over in (path for path in folder.iterdir() if path.name.startswith(prefix)):
-        with _folder_held(left_over) as is_ours:
+        with storage.folder_held(left_over) as is_ours:
             if is_ours:
                 shutil.rmtree(left_over, ignore_errors=True)
     try:
@@ -147,24 +147,10 @@ def _part(folder: Path, prefix: str) -> Iterator[Path]:
         error.filename = str(folder)  # nobody knows the other name
         raise
     try:
-        with _folder_held(part):
+        with storage.folder_held(part):
             yield part
     finally:
         shutil.rmtree(part, ignore_errors=True)
-
-
-@contextmanager
-def _folder_held(folder: Path) -> Iterator[bool]:
-    """Hold a folder for this process, and say whether nobody else does. Where folders cannot be held, nobody does."""
-    try:
-        descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:
-        yield os.name != "posix"
-        return
-    try:
-        yield storage.hold(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 @contextmanager

@@ -19,6 +19,8 @@ from device.words import LimitError, LinkError
 TRIES = 4
 RECONNECT_S = 5.0
 """So long a command waits for a gun that was unplugged."""
+ARM_WITHIN_S = 1.0
+"""A gun that comes back later than this is not armed: whoever plugged it in has their hands at it."""
 
 _T = TypeVar("_T")
 
@@ -89,10 +91,18 @@ class Arming:
         return (self.disarms, self._link.session) == (disarms, session)
 
     def arm(self, disarms: int) -> None:
-        """Arm, unless it was disarmed since. `LinkError`: it was, or the gun does not answer, or has a fault."""
+        """Arm at once, unless it was disarmed since. `LinkError`: it was, or the gun is silent, or has a fault."""
+        latest_s = time.monotonic() + ARM_WITHIN_S
         try:
-            session = ask_again(self._link, "ARM", lambda: self.disarms == disarms).session
-        except (lines.CommandRefused, lines.CalledOff):
+            session = ask_again(
+                self._link, "ARM", lambda: self.disarms == disarms and time.monotonic() <= latest_s
+            ).session
+        except lines.CalledOff as error:
+            if self.disarms != disarms:
+                raise
+            self.disarm()  # an ARM before may have reached it
+            raise lines.Disconnected(f"not armed: the gun was gone for more than {ARM_WITHIN_S:g} s") from error
+        except lines.CommandRefused:
             raise
         except LinkError:  # it may be armed, and its answer lost
             self.disarm()

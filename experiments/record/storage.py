@@ -173,6 +173,20 @@ def hold(descriptor: int, patience_s: float = 0.0) -> bool:
 _AGAIN_S = 0.01
 
 
+@contextmanager
+def folder_held(folder: Path, patience_s: float = 0.0) -> Iterator[bool]:
+    """Hold a folder for this process, and say whether nobody else does. Where folders cannot be held, nobody does."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        yield os.name != "posix"
+        return
+    try:
+        yield hold(descriptor, patience_s)
+    finally:
+        os.close(descriptor)
+
+
 def is_held(path: Path) -> bool:
     """Whether somebody holds a file. To find out it is held for a moment, which others who only look do not notice."""
     descriptor = open_to_read(path)

@@ -42,6 +42,8 @@ _HALTED = (
 )
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S = 1.0
+_F12 = "[24~"
+"""What is left on a line of the console's key for an emergency stop."""
 
 
 class TerminalScreen:
@@ -199,7 +201,7 @@ class TerminalScreen:
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
         """The event that a line means there, or what to say about it."""
-        if line.startswith("!"):
+        if line.startswith("!") or _F12 in line:
             return events.EmergencyStop()
         word, _, rest = line.removeprefix("/").partition(" ")
         word = word.lower()
@@ -207,6 +209,8 @@ class TerminalScreen:
         free = words or _answers(position, line)
         if word in _COMMANDS and (line.startswith("/") or not free):
             return _command(word, rest.strip())
+        if "!" in line and not words:  # behind what was half typed
+            return events.EmergencyStop()
         return _line(line, position, now_s)
 
     # showing

@@ -54,6 +54,11 @@ class Moment:
         step = self.position.step
         return repeatable(self.history, step, trial_at(self.plan, self.history, step))
 
+    @property
+    def keys_from_s(self) -> float:
+        """From when on a participant's key may answer; after another question a doubled press is none either."""
+        return self.position.keys_from_s + (0.0 if self.position.asked_at_onset else self.guard_s)
+
     def is_ready(self, at_s: float) -> bool:
         """Whether a press at a time would be late enough for what stands there."""
         return self.painted_s is not None and at_s - self.painted_s >= self.guard_s
@@ -138,7 +143,7 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return _taken(moment, rank)
         case events.Answer(response=response) if not _is_choice(moment, response):
             return f"“{response}” is not among the answers."
-        case events.Fire() if moment.gun_silence:
+        case events.Fire() | events.Rearm() if moment.gun_silence:
             return f"See to the gun first: {moment.gun_silence.rstrip('.')}."
         case events.Undo() if moment.further_back is None:
             return "There is nothing to undo in this set."
@@ -168,10 +173,9 @@ def _not_asked(
         return f"“{event.response}” is not among the answers."
     if event.typed:
         return "It went into what is open on the console: leave that (Esc), then have it pressed again."
-    onset_s = moment.position.onset_s
-    if (onset_s is None or event.at_s >= onset_s) and not moment.paused_between(event.at_s, event.at_s):
+    if event.at_s >= moment.keys_from_s and not moment.paused_between(event.at_s, event.at_s):
         return ""
-    return "It went down before the stimulus, or in a pause."
+    return f"It went down before the {'stimulus' if moment.position.asked_at_onset else 'question'}, or in a pause."
 
 
 def _taken(moment: Moment, rank: float | None) -> str:

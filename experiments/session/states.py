@@ -11,7 +11,7 @@ from enum import StrEnum
 
 from experiments.session import events
 from experiments.session.events import Event
-from experiments.session.steps import Asking, Step
+from experiments.session.steps import Ask, Asking, FireShot, Step
 
 
 class State(StrEnum):
@@ -182,8 +182,9 @@ class Position:
 
     `since_s` is since when the states are as they are; `until_s` is when a break ends, but for the pause that is on;
     `onset_s` is when the last stimulus began; `not_before_s` is from when on the participant's next is taken at all;
-    `paused_s` is since when the run is paused; `correcting` is what asked for the entry that is open; `why` is
-    the reason of a pause that nobody asked for, of a halt or of a stop.
+    `keys_from_s` is from when on a participant's key may answer what is asked: the onset, if `asked_at_onset`, right
+    after one stimulus, else when it was asked; `paused_s` is since when the run is paused; `correcting` is what asked
+    for the entry that is open; `why` is the reason of a pause that nobody asked for, of a halt or of a stop.
     """
 
     states: tuple[State, ...] = (S.SAVING,)
@@ -194,6 +195,8 @@ class Position:
     until_s: float | None = None
     onset_s: float | None = None
     not_before_s: float | None = None
+    keys_from_s: float = 0.0
+    asked_at_onset: bool = False
     paused_s: float | None = None
     correcting: Asking | None = None
     why: str = ""
@@ -277,6 +280,8 @@ def entered(position: Position, state: State, now_s: float, step: Step | None, u
     A break that comes in a pause ends by as much later as the pause lasts from now on.
     """
     new = step is not None and step is not position.step
+    at_onset = _is_asked_at_onset(position, step) if new else position.asked_at_onset
+    asked_s = position.onset_s if at_onset and position.onset_s is not None else now_s
     if until_s is not None and position.paused_s is not None:
         until_s -= now_s - position.paused_s  # the whole pause is given back at its end
     return replace(
@@ -289,7 +294,15 @@ def entered(position: Position, state: State, now_s: float, step: Step | None, u
         until_s=until_s,
         onset_s=None if state in ARMED else position.onset_s,
         not_before_s=None,
+        keys_from_s=asked_s if new else position.keys_from_s,
+        asked_at_onset=at_onset,
     )
+
+
+def _is_asked_at_onset(position: Position, step: Step | None) -> bool:
+    """What was pressed in a train, or for the question before, is no answer to one that nobody had asked yet."""
+    after_shot = isinstance(position.step, FireShot) and position.onset_s is not None
+    return after_shot and isinstance(step, Ask) and not step.later
 
 
 def why_after(before: Position, event: Event) -> str | None:

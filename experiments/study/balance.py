@@ -58,6 +58,11 @@ def group_of_next_run(
     return least_used(count, [one.group for one in _plans(results, config.experiment, registered, head_of, by)])
 
 
+def is_balanced(config: DesignConfig) -> bool:
+    """Whether what a run gets hangs on the runs before it."""
+    return planning.square_size(config) > 0 or len(planning.groups(config)) > 1
+
+
 def least_used(count: int, used: Sequence[int]) -> int:
     """The number below `count` that was used least, the first of them.
 

@@ -6,11 +6,12 @@ A key acts when it goes down and was up before. Auto-repeat never acts, nor does
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Literal, get_args
 
+from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig
 from experiments.screens.phrases import phrase
 from experiments.session import events
@@ -240,16 +241,24 @@ _LETTERS: dict[str, Name] = {
 }
 
 
-def shared_keys(question: QuestionConfig) -> list[str]:
-    """The participant's own keys that the console takes as well: there nobody could tell whose hand pressed one.
+def shared_keys(question: QuestionConfig, questions: Iterable[QuestionConfig]) -> list[str]:
+    """The participant's own keys that the console takes as well, also for another question: whose hand was it?
 
     >>> asked = QuestionConfig(kind="yes-no", text="Was there one?", keys={"yes": "right", "no": "u"})
-    >>> shared_keys(asked), shared_keys(asked.model_copy(update={"keys": {"yes": "right", "no": "left"}}))
-    (['u'], [])
+    >>> other = QuestionConfig(kind="choice", text="How was it?", answers=("hard", "weak"))
+    >>> free = asked.model_copy(update={"keys": {"yes": "right", "no": "w"}})
+    >>> shared_keys(asked, [asked]), shared_keys(free, [free]), shared_keys(free, [free, other])
+    (['u'], [], ['w'])
     """
-    asked = choices(question)
-    heard = {one.key.upper() for one in asked} | {command.key for command in KEY_COMMANDS}
-    return [one.own_key for one in asked if one.own_key.upper() in heard]
+    heard = {one.key.upper() for any_one in questions for one in choices(any_one)}
+    heard |= {command.key for command in KEY_COMMANDS}
+    return [one.own_key for one in choices(question) if one.own_key.upper() in heard]
+
+
+def own_arrows(design: DesignConfig) -> frozenset[str]:
+    """The participant's keys that no text takes, by their names."""
+    own = {one.own_key for question in design.questions.values() for one in choices(question)}
+    return frozenset(key for key in own if len(key) > 1)
 
 
 def field_at(position: Position) -> Literal["number", "words"] | None:

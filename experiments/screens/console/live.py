@@ -30,14 +30,13 @@ from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
-from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of
+from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of, noise_of
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
 from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import NoiseIs
 from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
@@ -187,7 +186,7 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     setup, _ = setup_in(request.language, request.setup)
     check_monitor(options.monitor)
     if options.keys:
-        check_own_keys(setup)
+        check_own_keys(setup, rates=options.screen)
     look = look_of(request, len(QGuiApplication.screens()))
 
     def open_link() -> ParticipantLink:
@@ -206,18 +205,10 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
         setup,
         rates=options.screen,
         own_keys=options.keys,
-        noise=_noise(link) if options.noise else None,
+        noise=noise_of(link) if options.noise else None,
         hand="synthetic" if request.visual else "participant",
         said=said,
     )
-
-
-def _noise(link: ParticipantLink) -> NoiseIs:
-    """Masking noise, which ends with the participant's process; why it stays off, if it does."""
-    try:
-        return link.noise(on=True)
-    except ParticipantError as error:
-        return NoiseIs(on=False, message=phrase("Masking noise stays off: {error}", error=error))
 
 
 class Unfinished(QDialog):

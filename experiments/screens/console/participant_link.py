@@ -26,10 +26,11 @@ from experiments.screens.texts import place_in_set
 from experiments.session import events
 from experiments.session.events import OwnHand
 from experiments.session.history import ranks_of_others
+from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Describe, Inform, Rate, Step
 from experiments.study.folders import PlaceError
-from experiments.tasks.questions import first_choices
+from experiments.tasks.questions import choices, first_choices
 
 WAIT, PAUSED, THANKS = ENGLISH_MESSAGES.wait, ENGLISH_MESSAGES.paused, ENGLISH_MESSAGES.thanks
 
@@ -41,16 +42,29 @@ _OWN = ("left", "right", "up", "down", *"123456789")
 """Keys that the console leaves to the participant."""
 
 
-def check_own_keys(setup: Setup[DesignConfig]) -> None:
-    """`PlaceError`: a key of the participant's own would be the experimenter's as well."""
-    for name, question in setup.config.questions.items():
-        if shared := shared_keys(question):
-            keys = ", ".join(f'{one} = "{key}"' for one, key in zip(question.named_answers, _OWN, strict=False))
-            raise PlaceError(
-                f"--participant-keys: {setup.source}: questions.{name}: {', '.join(shared)} would be a key of the "
-                "console as well, so nobody could tell who pressed it; give the answers keys of their own, such as "
-                f"keys = {{ {keys} }}"
-            )
+def check_own_keys(setup: Setup[DesignConfig], *, rates: bool = False) -> None:
+    """`PlaceError`: a key of the participant's own would be the experimenter's as well, or be typed at the console.
+
+    `rates`: ratings and descriptions are given on the participant's screen.
+    """
+    questions = setup.config.questions
+    on_page = ("rating", "ranking", "text") if rates else ()
+    typed = [name for name, one in questions.items() if not one.named_answers and one.kind not in on_page]
+    for name, question in questions.items():
+        if shared := shared_keys(question, questions.values()):
+            raise _no_key(setup, name, f"{', '.join(shared)} would be a key of the console as well")
+        if typed and (letters := [one.own_key for one in choices(question) if len(one.own_key) == 1]):
+            field = f"{', '.join(letters)} would be typed into the console's field for questions.{typed[0]} as well"
+            raise _no_key(setup, name, field)
+
+
+def _no_key(setup: Setup[DesignConfig], name: str, why: str) -> PlaceError:
+    answers = setup.config.questions[name].named_answers
+    keys = ", ".join(f'{one} = "{key}"' for one, key in zip(answers, _OWN, strict=False))
+    return PlaceError(
+        f"--participant-keys: {setup.source}: questions.{name}: {why}, so nobody could tell who pressed it; give the "
+        f"answers keys of their own, such as keys = {{ {keys} }}"
+    )
 
 
 def check_font(request: RunRequest) -> None:
@@ -79,6 +93,14 @@ def look_of(request: RunRequest, screens: int) -> messages.Look:
 def _has_a_page(step: Step | None) -> bool:
     """Whether something can be asked on the participant's own screen: a scale or words, not any number."""
     return isinstance(step, Describe) or (isinstance(step, Rate) and step.grain > 0)
+
+
+def noise_of(link: ParticipantLink) -> messages.NoiseIs:
+    """Masking noise, which ends with the participant's process; why it stays off, if it does."""
+    try:
+        return link.noise(on=True)
+    except ParticipantError as error:
+        return messages.NoiseIs(on=False, message=phrase("Masking noise stays off: {error}", error=error))
 
 
 class ParticipantSide:
@@ -122,10 +144,14 @@ class ParticipantSide:
         self._live, self._tell, self.planned = live, tell, len(live.plan.trials)
         self._tell(ParticipantSeen())
         self._link.listen(self._heard, self._gone)
+        return self._noise_told()
+
+    def _noise_told(self) -> str:
+        """What the record is to say of the noise, if anything; the console hears that it stays off."""
         if self._noise is None:
             return ""
         if not self._noise.on:
-            tell(Trouble(text=self._noise.message))
+            self._tell(Trouble(text=self._noise.message))
             return self._noise.message
         return phrase("Masking noise plays.")
 
@@ -186,15 +212,15 @@ class ParticipantSide:
                 self._tell(Trouble(text=phrase("Enter the answer here: {error}.", error=error)))
 
     def _judged(self, step: Ask, position: Position, wanted: Wanted) -> None:
-        onset_s = position.since_s if position.onset_s is None else position.onset_s
-        paused = self._live is not None and self._live.moment.paused_between(onset_s, position.since_s)
+        from_s = position.since_s if self._live is None else self._live.moment.keys_from_s
+        paused = self._live is not None and self._live.moment.paused_between(from_s, position.since_s)
         question = messages.AskChoice(
             question=self._numbered(step) if step.later else step.text,
             answers=tuple(
                 messages.KeyedAnswer(answer=one.answer, label=one.label, key=one.own_key) for one in step.choices
             ),
-            onset_s=position.since_s if paused else onset_s,  # a key in a pause is no answer
-            once_seen=paused,  # nor one while their screen still says so
+            onset_s=position.since_s if paused else from_s,  # a key in a pause is no answer
+            once_seen=paused or not position.asked_at_onset,  # nor one while their screen still says something else
         )
         while wanted() and not self._keyed(question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
@@ -303,7 +329,11 @@ class ParticipantSide:
         link.listen(self._heard, self._gone)
         self._tell(Trouble(text=phrase("The participant's screen is there again."), mood="good"))
         self._offer(events.ParticipantBack())
+        if self._noise is not None:
+            self._noise = noise_of(link)  # that of the program before ended with it
         if self._live is not None:
+            if noise := self._noise_told():
+                self._live.remark(Noted(trial=None, text=noise))
             self.follow(self._live.position)
 
     def close(self) -> None:

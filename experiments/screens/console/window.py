@@ -18,7 +18,7 @@ from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.instructions import instruction
-from experiments.screens.console.keys import BY_NAME, Name, Typing
+from experiments.screens.console.keys import BY_NAME, Name, Typing, own_arrows
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
@@ -67,6 +67,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._told: GrowingHistory = []
         self._tracks: Tracks | None = None
         self.controls: Controls | None = None
+        self._own_arrows = own_arrows(about.setup.config)
         self.drawn, self._painted = Position(), -1
         self.gun: view.GunSeen | None = None
         self.participant: view.ParticipantSeen | None = None
@@ -314,6 +315,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if self.controls is None:
             return "stop" if key == BY_NAME["stop"].key and not self._idle("stop") else None
         return self.controls.command(key, ctrl=ctrl)
+
+    def is_elsewhere(self, key: str) -> bool:
+        """Whether a key is the participant's, and does nothing here: in a field it would move the caret."""
+        return self.about.participant_keys and key in self._own_arrows
 
     def down(self, name: Name, at_s: float) -> None:
         """The key of a command went down."""

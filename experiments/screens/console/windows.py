@@ -199,6 +199,10 @@ _NAMES = {
     QtCore.Qt.Key.Key_F1: "F1",
     QtCore.Qt.Key.Key_F2: "F2",
     QtCore.Qt.Key.Key_F12: "F12",
+    QtCore.Qt.Key.Key_Left: "left",
+    QtCore.Qt.Key.Key_Right: "right",
+    QtCore.Qt.Key.Key_Up: "up",
+    QtCore.Qt.Key.Key_Down: "down",
 }
 _PLACES = {
     first + place: letter
@@ -215,6 +219,9 @@ class Hears(Protocol):
 
     def command(self, key: str, *, ctrl: bool) -> Name | None:
         """The command that a key is now."""
+
+    def is_elsewhere(self, key: str) -> bool:
+        """Whether a key is the participant's, and does nothing here."""
 
     def down(self, name: Name, at_s: float) -> None:
         """The key of a command went down."""
@@ -261,7 +268,7 @@ class Keyboard(QtCore.QObject):
         acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
         name = self._hears.command(key, ctrl=bool(event.modifiers() & QtCore.Qt.KeyboardModifier.ControlModifier))
         if name is None:
-            return self._is_stale_text(key, fresh=acts)
+            return self._hears.is_elsewhere(key) or self._is_stale_text(key, fresh=acts)
         self._into.pop(key, None)
         if acts:
             self._hears.down(name, at_s)
