@@ -24,6 +24,7 @@ from analysis.report.serial import plain
 from device import LinkError
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding
+from device.serial_gun.lines import IN_USE
 from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import sha256
@@ -230,6 +231,7 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.not_fired(), "fails", "see to what “gun” says"),
         (verdicts.of_conformance([BROKEN]), "fails", "nobody may hold this gun"),
         (verdicts.of_link_failure("no answer"), "fails", "cable"),
+        (verdicts.of_link_failure(f"cannot open /dev/gun: {IN_USE}"), "fails", "close what has it open"),
         (verdicts.of_wrong_version("speaks version 3"), "fails", "its firmware is that of this Recoil"),
         (verdicts.of_failure("gun", "gun plug-in bad: its import failed"), "fails", "uninstall it"),
         (verdicts.of_sensor(SENSOR), "good", ""),

@@ -199,12 +199,14 @@ def test_every_command_has_its_outcome_and_its_time(pair):
 
 
 def test_a_closed_gun_is_disarmed_and_its_port_free(pair):
+    pair.ready()
+    pair.gun.fire(a_shot())
     pair.gun.close()
     pair.gun.close()
     for ask in (pair.gun.identify, pair.gun.arm, lambda: pair.gun.fire(a_shot())):
         with pytest.raises(LinkError, match="closed"):
             ask()
-    assert pair.gun.status().state == "disarmed"
+    assert (pair.gun.status().state, pair.gun.status().shots) == ("disarmed", 1)
     assert not pair.twin.core.strict
     again = open_gun(f"serial:{pair.socket.address}", clock=time.monotonic)
     again.close()

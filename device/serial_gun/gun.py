@@ -118,7 +118,8 @@ class SerialGun:
     def status(self) -> GunStatus:
         """The gun at this moment. After `close` what is known without it. `LinkError`: it does not answer."""
         if self._closed:
-            return self._status("disarmed", 0, 0.0, self.history.ready_s, None)
+            counted = 0 if self._counted is None else self._counted[1]
+            return self._status("disarmed", counted, 0.0, self.history.ready_s, None)
         reply, said = standing(self.link)
         (ready,) = self.link.host(said.ready_us)
         next_s = max(self.history.ready_s, ready_s(said, reply, ready))

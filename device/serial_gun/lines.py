@@ -323,9 +323,12 @@ class SerialPort:
             raise Disconnected(f"the line is gone: {error}") from error
 
 
+IN_USE = "another program, or another run, has it open: close that first"
+
+
 def _reason(error: Exception) -> str:
     """What went wrong, in the system's words: pyserial's own repeat address and number."""
     number = getattr(error, "errno", None)
     if number == errno.EAGAIN:
-        return "another program, or another run, has it open: close that first"
+        return IN_USE
     return os.strerror(number) if isinstance(number, int) else str(error)

@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import Literal
 
 from device.plugin.conformance import ConformanceFinding
+from device.serial_gun.lines import IN_USE
 from experiments.catalogues.catalogue import Language
 from experiments.catalogues.fonts import Font
 from experiments.doctor import figures
@@ -198,6 +199,8 @@ def of_wrong_version(reason: str) -> figures.DoctorFinding:
 def of_link_failure(reason: str) -> figures.DoctorFinding:
     """A gun that does not answer."""
     advice = "check power, cable and port; for a serial port you must be in the group dialout on Linux"
+    if IN_USE in reason:
+        advice = "close what has it open, then look again"
     return figures.DoctorFinding(check="gun", verdict="fails", measured=reason, advice=advice)
 
 
