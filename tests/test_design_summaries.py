@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +11,19 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from analysis.report.figures import style
 from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.diagnostics import sphericity
 from analysis.summary.assumptions import not_spherical
 from analysis.summary.designs import summarise
+from analysis.summary.figures.designs import figure_design
 from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.designs import lacking_conditions, result_sentences
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
+from tests.figure_files import touching
 from tests.tables_of_designs import loaded, simulated
 
 
@@ -316,3 +320,39 @@ def test_factors_that_are_called_like_a_column_of_the_frame_stay_apart():
     assert set(frame["n"]) == {24}
     assert len(frame[["factor_n", "factor_question"]].drop_duplicates()) == 6
     assert frame["ci_low"].dtype == float
+
+
+_AS_NUMBER = re.compile(r"\$(?:(?P<times>[0-9.]+) \\cdot )?10\^\{(?P<power>-?[0-9]+)\}\$")
+
+
+def _number_at(label):
+    power = _AS_NUMBER.fullmatch(label)
+    return float(label) if power is None else float(power["times"] or 1.0) * 10.0 ** int(power["power"])
+
+
+MODULI = {
+    "x0.01 to x1000": lambda person, answer: answer * 10.0 ** (person % 6 - 2),
+    "1e-9 to 1e12": lambda person, _: 10.0 ** (3 * (person % 8) - 9),
+    "all the same": lambda _, __: 1.0,
+    "one in a hundred": lambda _, answer: 3.4 + 0.01 * answer,
+    "tiny": lambda _, answer: 1e-7 * answer,
+}
+
+
+@pytest.mark.parametrize("said", MODULI.values(), ids=MODULI)
+def test_numbers_at_the_ticks_of_a_logarithmic_axis_are_those_of_their_places(said, tmp_path, monkeypatch):
+    config, laws = loaded("magnitude")
+    table = simulated(config, laws, 12)
+    person = table["participant_id"].str[1:].astype(int)
+    table["strength"] = [said(*pair) for pair in zip(person, table["strength"], strict=True)]
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(summarise(config, table), tmp_path / "figure")
+    drawn[0].draw_without_rendering()
+    axis = drawn[0].axes[0].yaxis
+    low, high = axis.get_view_interval()
+    ticks = [(tick.get_loc(), tick.label1.get_text()) for tick in axis.get_major_ticks() if low < tick.get_loc() < high]
+    assert len(ticks) >= 3
+    assert [_number_at(label) for _, label in ticks] == pytest.approx([place for place, _ in ticks], rel=1e-5)
+    assert not any(tick.label1.get_text() for tick in axis.get_minor_ticks())
+    assert touching(drawn[0]) == []

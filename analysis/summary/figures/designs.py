@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from matplotlib.axes import Axes
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from analysis.report.figures.style import (
     MANY_METHODS,
@@ -36,6 +36,10 @@ _TICKS = 10
 """So many levels have a tick each."""
 _ASIDE = 0.012
 """So far, as a share of the axis, two series of numbers stand apart: about a mark's width."""
+_EVEN_STEPS, _WITH_HALVES = 1.0, 2.5
+"""Over fewer decades a logarithmic axis has ticks in even steps, and at 2 and 5 of each decade too."""
+_PLAIN = 1e-4, 1e6
+"""Numbers between these stand at ticks as they are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,10 +175,26 @@ def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, j
 
 def _logarithmic(axes: Axes, *, both: bool) -> None:
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(ScalarFormatter())
-    axes.yaxis.set_minor_formatter(ScalarFormatter())
+    low, high = axes.get_ylim()
+    decades = math.log10(high) - math.log10(low)
+    if decades < _EVEN_STEPS:
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+    else:
+        subs = (1.0, 2.0, 5.0) if decades < _WITH_HALVES else (1.0,)
+        axes.yaxis.set_major_locator(LogLocator(subs=subs, numticks=7))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _numbered(value)))
+    axes.yaxis.set_minor_formatter(NullFormatter())  # all of them would lie on one another
     if both:
         axes.set_xscale("log")
+
+
+def _numbered(value: float) -> str:
+    """A number at a tick as it is; a power of ten where it would be long."""
+    if _PLAIN[0] <= value < _PLAIN[1]:
+        return f"{value:.6g}"
+    digits, power = f"{value:.6e}".split("e")
+    times = "" if float(digits) == 1.0 else rf"{float(digits):g} \cdot "
+    return rf"${times}10^{{{int(power)}}}$"
 
 
 def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
