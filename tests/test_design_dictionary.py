@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 
+from analysis.archive.bids import described
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.record.design_columns import columns
@@ -22,3 +23,11 @@ def test_every_column_is_described_beside_the_logs_and_only_their_owner_reads_it
     assert all(f"| `{name}` |" in text for name in header)
     assert [column.name for column in columns(setup.config)] == header
     assert stat.S_IMODE(page.stat().st_mode) == 0o600
+
+
+def test_levels_in_intervals_have_the_unit_of_their_factor():
+    made = {column.name: column for column in columns(load_setup("staircase").config)}
+    for name, unit, words in (("pulse_s_1", "s", "Pulse 1"), ("pulse_s_2", "s", "Pulse 2")):
+        assert made[name].unit == unit
+        assert described(made[name], name)["Units"] == unit
+        assert described(made[name], name)["LongName"] == words

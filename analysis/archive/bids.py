@@ -164,7 +164,7 @@ def described(column: Column, name: str) -> ColumnDescription:
     """A column as BIDS describes it, from the data dictionary. `name` is what it is called in the data set."""
     text = re.sub(r"\bempty\b", "n/a", column.description).replace("`", "'")
     found: ColumnDescription = {
-        "LongName": long_name(name),
+        "LongName": long_name(name, column.unit),
         "Description": f"{text}; {_CLEANED}" if _is_free_text(column) else text,
         "Format": _FORMATS[column.type],
     }
@@ -175,13 +175,14 @@ def described(column: Column, name: str) -> ColumnDescription:
     return found | _MORE.get(name, {})
 
 
-def long_name(name: str) -> str:
+def long_name(name: str, unit: str = "") -> str:
     """A column's name in words: the unit at its end is told elsewhere.
 
-    >>> long_name("exposure_s"), long_name("response_time_valid")
-    ('Exposure', 'Response time valid')
+    >>> long_name("exposure_s"), long_name("response_time_valid"), long_name("voltage_V_1", "V")
+    ('Exposure', 'Response time valid', 'Voltage 1')
     """
-    return name.removesuffix("_s").replace("_", " ").capitalize()
+    words = re.sub(rf"_{re.escape(unit or 's')}(?=(_[0-9]+)?$)", "", name).replace("_", " ")
+    return words[:1].upper() + words[1:]
 
 
 def readme(people: int, synthetic: int, *, free_text: bool) -> str:

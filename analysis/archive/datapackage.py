@@ -39,7 +39,7 @@ def schema(columns: Iterable[Column], keys: Sequence[str] = ()) -> bytes:
 def _field(column: Column) -> dict[str, object]:
     field: dict[str, object] = {
         "name": column.name,
-        "title": long_name(column.name),
+        "title": long_name(column.name, column.unit),
         "type": _TYPES[column.type],
         "description": column.description,
     }

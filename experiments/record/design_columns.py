@@ -46,11 +46,11 @@ def _factors(design: DesignConfig, names: Iterable[str]) -> Iterator[Column]:
         chosen = _CHOSEN if name in design.adapted else ""
         if not (compared and design.trial.kind == "pair"):
             what = "level that was compared" if compared else _MEANINGS.get(name, "level of this factor")
-            yield _factor(name, factor, what + chosen)
+            yield _factor(name, name, factor, what + chosen)
         if compared:
             for place in range(1, design.trial.intervals + 1):
                 own = chosen if in_interval(name, place) in design.chosen_names else "; empty if there was no stimulus"
-                yield _factor(in_interval(name, place), factor, f"level in interval {place}{own}")
+                yield _factor(name, in_interval(name, place), factor, f"level in interval {place}{own}")
 
 
 _CHOSEN = ", chosen by the answers before; empty if it was not felt"
@@ -60,10 +60,11 @@ _MEANINGS = {
 }
 
 
-def _factor(name: str, factor: FactorConfig, description: str) -> Column:
+def _factor(name: str, column: str, factor: FactorConfig, description: str) -> Column:
+    """A column of a factor's levels; the unit ends the factor's name, not always the column's."""
     if isinstance(factor.all_levels[0], float):
-        return tables.number_column(name, name.rsplit("_", 1)[-1] if "_" in name else "", description)
-    return tables.level_column(name, tuple(map(shown_level, factor.all_levels)), description)
+        return tables.number_column(column, name.rsplit("_", 1)[-1] if "_" in name else "", description)
+    return tables.level_column(column, tuple(map(shown_level, factor.all_levels)), description)
 
 
 def _questions(design: DesignConfig) -> Iterator[Column]:
