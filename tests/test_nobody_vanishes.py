@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -216,3 +217,21 @@ def test_of_several_questions_without_an_answer_each_person_is_told_once() -> No
     ]
     (line,) = exclusion_lines(gone)
     assert line.startswith("left out of tests of odd: 2 participants (rule: a test takes who answered")
+
+
+def test_a_copy_of_a_folder_leaves_out_nobody_and_the_original_stays(tmp_path: Path) -> None:
+    results = tmp_path / "results"
+    for code in ("P01", "P02"):
+        ran(results, code)
+    shutil.copytree(results / "sub-P01", results / "backup" / "sub-P01")
+    logs = read_logs([results])
+    assert [file.parent.parent.name for file in logs.files] == ["results", "results"]
+    (problem,) = logs.problems
+    assert problem.file.parent.parent.name == "backup"
+    assert "byte for byte" in problem.message
+    statistics = with_everybody(summarize(logs), logs)
+    assert [(one.participant, Path(one.file).parts[0]) for one in statistics.excluded] == [("", "backup")]
+    assert statistics.participation is not None
+    counts = statistics.participation.experiments["preference"]
+    assert (counts.analysed, counts.left_out, counts.not_done) == (2, 0, 0)
+    assert statistics.participation.absent == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -99,6 +100,8 @@ class LogsSoFar:
     """The file that first held each content."""
     same: dict[str, set[str]] = field(default_factory=dict)
     """The files that hold what the first does, with the first."""
+    copied: set[tuple[str, str, str]] = field(default_factory=set)
+    """Folder, code and experiment of the logs that are files copied: nobody took part in these."""
     members: dict[str, Mapping[str, Member]] = field(default_factory=dict)
     """Who stands in the register of each results folder."""
     remarks: list[Problem] = field(default_factory=list)
@@ -219,27 +222,32 @@ class LogsSoFar:
                 self._leave(number, said)
 
     def _leave_same(self) -> None:
-        """Of files that are alike byte for byte the one that was named first stays."""
+        """Of files that are alike byte for byte the one named first stays, of these the one in fewest folders.
+
+        The copy is nobody's: whoever it is of stands in the analysis, or among those left out, by the file that stays.
+        """
         stays = dict[str, str]()
         for paths in self.same.values():
-            first, *others = sorted(paths, key=lambda path: (self.given.get(path, 0), path))
+            first, *others = sorted(paths, key=lambda path: (self.given.get(path, 0), path.count(os.sep), path))
             stays |= dict.fromkeys(others, first)
         for number in [*self.studies] if stays else ():
             path = self.paths[number // LOGS_A_FILE]
             if path in stays:
                 said = f"holds what {seen_from(stays[path], path)} holds, byte for byte (rule: a run counts once)"
-                self._leave(number, f"{said}; read one of both")
+                self.copied.add((self.studies[number], self.codes[number], self.experiments[number]))
+                self._leave(number, f"{said}; read one of both", nobody=True)
                 self.proven.pop(number, None)
 
     def _seen_from(self, number: int, other: int) -> str:
         """What the person of a log is called in what is said of another."""
         return other_log(self.codes[number], self.paths[number // LOGS_A_FILE], self.paths[other // LOGS_A_FILE])
 
-    def _leave(self, number: int, said: str) -> None:
-        """Leave out a log that was admitted."""
+    def _leave(self, number: int, said: str, *, nobody: bool = False) -> None:
+        """Leave out a log that was admitted; of `nobody`, its person is not left out with it."""
         if number in self.studies:
             file, study = Path(self.paths[number // LOGS_A_FILE]), self.studies.pop(number)
-            self.problems.append(BadLogError(said).of(file, self.codes[number], self.experiments[number], study))
+            code = "" if nobody else self.codes[number]
+            self.problems.append(BadLogError(said).of(file, code, self.experiments[number], study))
 
     def keep_out(self, first: DataKind) -> None:
         """Leave out the logs of other kinds of data than the first that is there."""
@@ -249,14 +257,19 @@ class LogsSoFar:
                 self._leave(number, kept_out(kind, first))
 
     def runs_by_kind(self, runs: Iterable[RunFile], first: DataKind) -> Mapping[DataKind, list[RunFile]]:
-        """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first."""
+        """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first.
+
+        The runs of logs that are copies are those of the logs that stay.
+        """
         kinds = {
             (study, self.codes[number], self.experiments[number]): self.kinds[number] or first
             for number, study in self.studies.items()
         }
         found: dict[DataKind, list[RunFile]] = {kind: [] for kind in get_args(DataKind)}
         for run in runs:
-            found[kinds.get((run.study, run.participant, run.experiment), first)].append(run)
+            key = run.study, run.participant, run.experiment
+            if key not in self.copied:
+                found[kinds.get(key, first)].append(run)
         return found
 
     def _go_together(self, one: int, other: int) -> bool:
