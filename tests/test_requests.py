@@ -126,13 +126,16 @@ def test_every_answer_has_its_section_with_its_numbers(answers: dict[str, Reques
     [
         ([0.1, -0.2, 0.3, 0.0, -0.1, 0.2], "which lies within the bounds: equivalence was shown, p = .001."),
         ([0.4, 0.6, 0.5, 0.3, 0.7, 0.45], "equivalence was not shown, p = .446, which is no proof"),
+        ([1.4, 1.6, 1.5, 1.3, 1.7, 1.45], "which lies wholly above the bounds: equivalence was not shown, p > .999"),
+        ([-1.4, -1.6, -1.5, -1.3, -1.7, -1.45], "which lies wholly below the bounds: equivalence was not shown,"),
     ],
 )
 def test_an_equivalence_is_told_in_words(values: list[float], said: str, answers: dict[str, Requested]) -> None:
     asked = replace(answers["equivalence"], result=tost_one_sample(values, -0.5, 0.5))
     (section,) = requested_sections(ReportData(title="x", statistics=StudyStatistics(requested=(asked,))))
     assert said in section.paragraphs[0]
-    assert section.paragraphs[0].endswith("no proof of a difference.") is ("not shown" in said)
+    no_proof = "not shown" in said and "wholly" not in said
+    assert section.paragraphs[0].endswith("no proof of a difference.") is no_proof
 
 
 def test_a_linear_model_of_right_and_wrong_says_that_another_is_meant_for_them(logs: Logs, tmp_path: Path) -> None:

@@ -74,9 +74,19 @@ def _equivalence_words(found: Equivalence) -> str:
     p = apa.p_value(found.p)
     if found.p is not None and found.p < found.alpha:
         return f"{told}, which lies within the bounds: equivalence was shown, {p}."
+    if (side := _outside(found)) is not None:
+        told += f", which lies wholly {side} the bounds"
+        return f"{told}: equivalence was not shown, {p}; the mean lies outside them."
     return (
         f"{told}, which reaches beyond the bounds: equivalence was not shown, {p}, which is no proof of a difference."
     )
+
+
+def _outside(found: Equivalence) -> str | None:
+    """On which side of the bounds the whole interval lies; `None` if some of it lies within."""
+    if found.ci_low is None or found.ci_high is None:
+        return None
+    return "above" if found.ci_low >= found.high else "below" if found.ci_high <= found.low else None
 
 
 def _table(one: Requested) -> Table | None:
