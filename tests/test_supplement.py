@@ -101,6 +101,15 @@ def test_clustering_that_turns_the_pooled_test_over_is_told_at_the_top(tmp_path:
     assert any("pooled binomial test is not to be read: vibration forward" in warning for warning in found["warnings"])
 
 
+def test_people_are_not_said_to_differ_where_they_are_only_few(tmp_path: Path) -> None:
+    found = study_of(tmp_path, [[9, 8, 9], [7, 9, 8]], timed=False).to_dict()
+    test = found["direction"]["binomial"]["vibration"]["forward"]
+    assert test["p"] < 0.05 < test["clustering"]["p_adjusted"]
+    assert not any("differ so much" in warning for warning in found["warnings"])
+    told = [entry["warning"] for entry in found["direction"]["assumptions"] if entry["warning"]]
+    assert any(one.startswith("people are too few") and "vibration forward" in one for one in told)
+
+
 ALIKE = np.column_stack([RIGHT[:, 0], RIGHT[:, 0], RIGHT[:, 1]])
 ADDITIVE = np.add.outer([3, 5, 4, 6], [0, 1, 3])
 DEGENERATE = {

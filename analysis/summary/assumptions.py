@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from analysis.summary.results import (
@@ -82,27 +83,33 @@ def _outliers(found: Supplement) -> Assumption:
 
 
 def _answers_independent(found: DirectionStatistics) -> Assumption:
-    turned = [
-        f"{method} {direction}"
-        for method, tests in found.binomial.items()
-        for direction, test in tests.items()
-        if _turned(test)
-    ]
-    warning = (
-        f"people differ so much that the pooled binomial test is not to be read: {', '.join(turned)}"
-        if turned
-        else None
-    )
+    tests = {f"{method} {name}": test for method, some in found.binomial.items() for name, test in some.items()}
+    turned = [name for name, test in tests.items() if _turned(test)]
+    few = [name for name, test in tests.items() if _unsure(test) and name not in turned]
+    warnings = []
+    if turned:
+        said = "people differ so much that the pooled binomial test is not to be read"
+        warnings.append(f"{said}: {', '.join(turned)}")
+    if few:
+        said = "people are too few for the test that allows for their differences to confirm the pooled binomial test"
+        warnings.append(f"{said}: {', '.join(few)}")
     text = "The pooled binomial tests take all answers as independent; the clustering in people stands beside each."
-    return Assumption(assumption=text, warning=warning, serious=bool(turned))
+    return Assumption(assumption=text, warning="; ".join(warnings) or None, serious=bool(turned))
+
+
+def _unsure(pooled: PooledBinomial) -> bool:
+    """Is the pooled p below .05, and the one that allows for clustering, on t with few degrees of freedom, not?"""
+    adjusted = pooled.clustering.p_adjusted
+    return adjusted is not None and bool(pooled.p < _ALPHA <= adjusted)
 
 
 def _turned(pooled: PooledBinomial) -> bool:
-    """Does the clustering change on which side of .05 the pooled p lies?"""
-    found = pooled.clustering
-    if found.design_effect is None or found.p_adjusted is None or found.design_effect <= 1.0:
+    """Does the design effect alone, were there ever so many people, take the pooled p from below .05 to above?"""
+    effect = pooled.clustering.design_effect
+    if not _unsure(pooled) or effect is None or effect <= 1.0:
         return False
-    return bool((pooled.p < _ALPHA) != (found.p_adjusted < _ALPHA))
+    z = abs(pooled.estimate - 0.5) * math.sqrt(4.0 * pooled.trials / effect)
+    return math.erfc(z / math.sqrt(2.0)) >= _ALPHA
 
 
 def _log_odds(found: DirectionStatistics) -> Assumption:
