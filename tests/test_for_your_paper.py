@@ -21,7 +21,7 @@ from analysis.summary.sections.quality import quality_section
 from analysis.summary.sections.supplement import supplement_sections
 from experiments.clock import VirtualClock
 from experiments.study import register
-from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows
+from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
 Reported = Callable[..., ReportData]
 
@@ -233,6 +233,15 @@ def test_numbers_of_trials_that_differ_are_said_as_they_are(careless: ReportData
     )
     (section,) = quality_section(careless)
     assert any("not everybody has as many trials" in item for item in section.items)
+
+
+def test_only_lines_that_are_drawn_are_promised(careless: ReportData, tmp_path: Path, reported: Reported) -> None:
+    assert careless.statistics.direction is not None
+    caption = directions_picture(careless.statistics.direction).caption
+    assert "Dashed lines: guessing and the absence of bias." in caption
+    whole = reported(write_study(tmp_path / "whole", participants=3)).statistics.direction
+    assert whole is not None
+    assert "the absence of bias, and the d′ of somebody who is always right" in directions_picture(whole).caption
 
 
 def test_a_time_of_exactly_0_is_told_as_a_reason_for_having_none(tmp_path: Path, reported: Reported) -> None:

@@ -302,7 +302,7 @@ def _draw_measure(axes: Axes, found: DirectionStatistics, measure: _Measure, tit
     methods = found.methods
     _frame(axes, methods, title, measure.label)
     reference_line(axes, 0.0, measure.zero)
-    limit = _largest_d_prime(found) if measure.key == "d_prime" else None
+    limit = largest_d_prime(found) if measure.key == "d_prime" else None
     if limit is not None:
         reference_line(axes, limit, "largest\npossible")
     values = _measured(found, measure.key)
@@ -335,8 +335,10 @@ def _extent(axes: Axes, values: FloatArray, limit: float | None) -> tuple[float,
     return low - room, high + room
 
 
-def _largest_d_prime(found: DirectionStatistics) -> float | None:
+def largest_d_prime(found: DirectionStatistics) -> float | None:
     """d′ of somebody who is always right; None if the numbers of trials differ or are not known."""
+    if any(test.fewest_and_most is not None for tests in found.binomial.values() for test in tests.values()):
+        return None
     counts = {
         tuple(tests[direction].trials / found.n for direction in _SIDES if direction in tests)
         for tests in found.binomial.values()

@@ -16,7 +16,7 @@ from analysis.summary.figures.delivered import figure_delivered
 from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.pairs import figure_pairs, has_scores
-from analysis.summary.figures.results import figure_8, figure_directions, has_matrix
+from analysis.summary.figures.results import figure_8, figure_directions, has_matrix, largest_d_prime
 from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
@@ -36,7 +36,7 @@ _DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
 CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY = "figure-conditional-accuracy", "figure-quantile-probability"
 
 _PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
-_LINES = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
+_ALWAYS_RIGHT = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
 _MARKS = "* p < .05, ** p < .01, *** p < .001, n.s. not significant"
 
 
@@ -161,13 +161,20 @@ def directions_picture(found: DirectionStatistics) -> Picture:
     sensitive = any(found.sensitivity.values())
     caption = (
         f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. "
-        f"{_without_backward(found)}{_direction_crowd(found.n)} Dashed lines: guessing{_LINES if sensitive else ''}."
+        f"{_without_backward(found)}{_direction_crowd(found.n)} Dashed lines: guessing{_other_lines(found)}."
     )
     rates = "; ".join(_rates_words(found, method) for method in found.methods[:_SPELLED_OUT])
     rates += f"; and {len(found.methods) - _SPELLED_OUT} more methods" if has_many(found) else ""
     what = "mean correct rates" if found.n > 1 else "correct rates"
     alt = f"Dot plot of the {what} with everybody's values and a line at chance, 50 %. {rates}."
     return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
+
+
+def _other_lines(found: DirectionStatistics) -> str:
+    """The dashed lines of d′ and criterion, as far as they are drawn."""
+    if not any(found.sensitivity.values()):
+        return ""
+    return " and the absence of bias" if largest_d_prime(found) is None else _ALWAYS_RIGHT
 
 
 def _without_backward(found: DirectionStatistics) -> str:
