@@ -100,7 +100,7 @@ def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path
     assert (
         "| preference | broken | 1 | left out: table or journal breaks a rule, or was changed since the run |" in page
     )
-    assert "Some participants are synthetic" in page
+    assert "All participants are synthetic" in page
     assert "preregistrations, with their dates, the reasons of amendments" in page
     assert "Runs in the archive, and left out" in (archive / "analysis" / "report.md").read_text()
     assert {path.parts[0] for path in (Path(one) for one in tree(archive / "results"))} == {
@@ -110,6 +110,18 @@ def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path
     said = " ".join((*done.left_out, *done.remarks))
     for words in ("P05 is excluded", "P04 has begun direction", "sub-P04_task-preference_ratings.csv"):
         assert words in said
+
+
+def test_the_methods_section_says_who_was_simulated_and_what_other_setups_have_otherwise(
+    made: tuple[Path, Path, Archived],
+) -> None:
+    page = (made[1] / "METHODS.md").read_text()
+    assert "3 participants, all of them synthetic (a simulation answered, not a person); gun:" in page
+    sections = [part for part in re.split(r"(?m)^# ", page) if part]
+    assert len(set(sections)) == len(sections)
+    (other,) = (part for part in sections if "What differs" in part)
+    assert "differs from the first setup of this experiment: experiment synthetic = " in other
+    assert not any(place in page for place in SECRET_PLACES)
 
 
 def test_what_a_sensor_measured_is_in_it_without_the_place_of_the_sensor(made: tuple[Path, Path, Archived]) -> None:

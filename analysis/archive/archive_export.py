@@ -28,6 +28,7 @@ from analysis.logs.exclusion_rules import Rules
 from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
+from analysis.logs.setups import setup_differences
 from analysis.report import placing
 from analysis.report.section import Section
 from analysis.report.serial import as_json
@@ -35,7 +36,7 @@ from analysis.report.terminal import Progress, unseen
 from analysis.summary.analyze import analyze
 from analysis.summary.requests import Requests
 from experiments.config.door import checked_table, load, read_text
-from experiments.config.setup import GunConfig
+from experiments.config.setup import GunConfig, sha256
 from experiments.rebuild import began_with, rebuild, shots_path, shots_table
 from experiments.record import design_columns, journal
 from experiments.record.dictionary import design_dictionary, shots_dictionary
@@ -44,6 +45,7 @@ from experiments.record.provenance import recoil_version
 from experiments.record.shots_table import SHOTS
 from experiments.record.tables import DataKind
 from experiments.study.folders import PlaceError
+from experiments.study.preregistration import Files
 from experiments.study.register import REGISTER_FILE
 from experiments.study.study import Member
 
@@ -238,17 +240,28 @@ def _write_pages(
 def _designs(runs: Iterable[_Run]) -> list[ArchivedDesign]:
     """The designs of the runs, each with its gun; one that was changed during the study stands as often as it was."""
     by_setup: dict[str, list[_Run]] = {}
+    setups: dict[str, Files] = {}
+    first: dict[str, Files] = {}
     for run in sorted(runs, key=lambda run: (run.contents.plan.experiment, run.code)):
-        by_setup.setdefault(run.contents.head.setup_sha256, []).append(run)
-    found = []
-    for some in by_setup.values():
-        head = some[0].contents.head
-        setup = head.setup_json if isinstance(head.setup_json, dict) else {}
-        gun = checked_table(GunConfig, setup.get("gun", {}), f"{head.path}: line 1")
-        codes = tuple(run.code for run in some)
-        spoken = tuple(run.contents.head.language for run in some if run.contents.head.language is not None)
-        found.append(ArchivedDesign(design=began_with(head), gun=gun, participants=codes, spoken=spoken))
-    return found
+        of_head = redaction.without_places(run.contents.head.setup_json)
+        setup = of_head if isinstance(of_head, dict) else {}
+        by_setup.setdefault(sha256(setup), []).append(run)
+        setups[sha256(setup)] = setup
+        first.setdefault(run.contents.plan.experiment, setup)
+    return [_design(some, setups[key], first[some[0].contents.plan.experiment]) for key, some in by_setup.items()]
+
+
+def _design(runs: Sequence[_Run], setup: Files, first: Files) -> ArchivedDesign:
+    """The design of runs of one setup; `first` is that of the experiment's first participant."""
+    head = runs[0].contents.head
+    return ArchivedDesign(
+        design=began_with(head),
+        gun=checked_table(GunConfig, dict(setup.get("gun", {})), f"{head.path}: line 1"),
+        participants=tuple(run.code for run in runs),
+        spoken=tuple(run.contents.head.language for run in runs if run.contents.head.language is not None),
+        synthetic=sum(run.kind == "synthetic" for run in runs),
+        differs=setup_differences(first, setup),
+    )
 
 
 def _citation(folders: Iterable[Path]) -> bytes | None:

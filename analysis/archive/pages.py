@@ -22,12 +22,18 @@ CITATION = "CITATION.cff"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArchivedDesign:
-    """A design with the gun that it ran on, who did it, and who of them in another language than the design's."""
+    """A design with the gun that it ran on, who did it, and who of them in another language than the design's.
+
+    `synthetic`: of so many participants simulations answered; `differs`: what the setup has otherwise than the first of
+    its experiment.
+    """
 
     design: DesignConfig
     gun: GunConfig
     participants: tuple[str, ...]
     spoken: tuple[ShownLanguage, ...] = ()
+    synthetic: int = 0
+    differs: str = ""
 
 
 _README = """# {title}
@@ -76,20 +82,20 @@ what people wrote (descriptions, notes, reasons) is `[redacted]`, as it might sa
   empty is empty;"""
 _WORDS = "what people wrote (descriptions, notes, reasons) is as it was: the archive was made with `--free-text`;"
 _SYNTHETIC = """
-Some participants are synthetic: a simulation answered, not a person (column `data` of `contents.csv`).
+{who} participants are synthetic: a simulation answered, not a person (column `data` of `contents.csv`).
 """
 
 
 def archive_page(title: str, version: str, entries: Sequence[Entry], *, free_text: bool) -> bytes:
     """The page of an archive: what lies where, who is in it and who is not, what is redacted and why."""
-    simulated = any(one.kind == "synthetic" for one in entries)
+    kinds = {one.kind for one in entries if one.archived} - {None}
     return _README.format(
         title=title,
         version=version,
         manifest=MANIFEST_FILE,
         contents=CONTENTS,
         counts="\n".join(_counts(entries)),
-        synthetic=_SYNTHETIC if simulated else "",
+        synthetic=_SYNTHETIC.format(who="Some" if len(kinds) > 1 else "All") if "synthetic" in kinds else "",
         redacted=_HIDDEN.format(words=_WORDS if free_text else _NO_WORDS),
     ).encode()
 
@@ -130,10 +136,20 @@ def methods(designs: Iterable[ArchivedDesign]) -> bytes:
 def _method(one: ArchivedDesign) -> Iterator[str]:
     people = how_many(len(one.participants), "participant")
     yield f"# {one.design.title}\n"
-    yield f"Experiment `{one.design.design}`, {people}; gun: {one.gun.title}.\n"
+    yield f"Experiment `{one.design.design}`, {people}{_simulated(one)}; gun: {one.gun.title}.\n"
+    if one.differs:
+        yield f"What differs from the first setup of this experiment: {one.differs}.\n"
     for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun)):
         yield f"{paragraph}\n"
     yield from _translations(one)
+
+
+def _simulated(one: ArchivedDesign) -> str:
+    """How many of the participants are nobody."""
+    if not one.synthetic:
+        return ""
+    who = "all" if one.synthetic == len(one.participants) else f"{one.synthetic:,}"
+    return f", {who} of them synthetic (a simulation answered, not a person)"
 
 
 def _translations(one: ArchivedDesign) -> Iterator[str]:

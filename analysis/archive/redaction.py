@@ -154,8 +154,8 @@ class _Pen:
         return {}
 
     def _head(self, value: Mapping[str, object]) -> dict[str, object]:
-        setup = _without_places(value["setup"])
-        laws = {"laws": _without_places(value["laws"])} if "laws" in value else {}
+        setup = without_places(value["setup"])
+        laws = {"laws": without_places(value["laws"])} if "laws" in value else {}
         original = {"format": FORMAT, "last_line_sha256": self.original}
         return {"setup": setup, "setup_sha256": sha256(setup), **laws, "redacted_from": original}
 
@@ -218,12 +218,12 @@ def _without_reasons(value: object) -> object:
     return [_without_reasons(one) for one in value] if isinstance(value, list) else value
 
 
-def _without_places(value: object, key: str = "") -> object:
+def without_places(value: object, key: str = "") -> object:
     """A config whose files are named without the folders of the computer that they lay on."""
     if isinstance(value, dict):
-        return {inner: _without_places(one, inner) for inner, one in value.items()}
+        return {inner: without_places(one, inner) for inner, one in value.items()}
     if isinstance(value, list):
-        return [_without_places(one) for one in value]
+        return [without_places(one) for one in value]
     if key in _FILES and isinstance(value, str) and _ELSEWHERE.match(value):
         return re.split(r"[\\/]", value)[-1]
     return value

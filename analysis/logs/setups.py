@@ -61,16 +61,20 @@ def _people(logs: Sequence[SetupOfLog]) -> str:
 
 
 def _differences(first: SetupOfLog, other: SetupOfLog) -> str:
-    """The keys that differ between the setups of two logs, each with both values."""
+    """What differs between the setups of two logs, as far as their journals can be read."""
     with suppress(JournalError):
-        before, after = _setup(first), _setup(other)
-        changes = [
-            f"{file} {change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
-            for file in ("experiment", "gun")
-            for change in changed_keys(file, before.get(file, {}), after.get(file, {}))
-        ]
-        return first_few(changes, _NAMED)
+        return setup_differences(_setup(first), _setup(other))
     return "another setup"
+
+
+def setup_differences(before: Files, after: Files) -> str:
+    """The keys that differ between two setups, each with both values."""
+    changes = [
+        f"{file} {change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
+        for file in ("experiment", "gun")
+        for change in changed_keys(file, before.get(file, {}), after.get(file, {}))
+    ]
+    return first_few(changes, _NAMED)
 
 
 def _setup(log: SetupOfLog) -> Files:
