@@ -14,6 +14,7 @@ from analysis.logs.reading import read_logs
 from analysis.summary.participation import participation
 from analysis.summary.sections import sections
 from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.exclusion_words import people_left_out
 from analysis.summary.sections.experiments import direction_section
 from analysis.summary.sections.manuscript import manuscript_section
 from analysis.summary.sections.pictures import directions_picture
@@ -242,6 +243,26 @@ def test_only_lines_that_are_drawn_are_promised(careless: ReportData, tmp_path: 
     whole = reported(write_study(tmp_path / "whole", participants=3)).statistics.direction
     assert whole is not None
     assert "the absence of bias, and the d′ of somebody who is always right" in directions_picture(whole).caption
+
+
+@pytest.mark.parametrize("way", ["forward", "backward"])
+def test_of_trials_in_one_direction_nothing_is_promised_of_the_other(
+    tmp_path: Path, reported: Reported, way: str
+) -> None:
+    for code, seed in (("P01", 1), ("P02", 2), ("P03", 3)):
+        rows = [row | {"direction": way, "correct": str(int(row["response"] == way))} for row in trial_rows(code, seed)]
+        write_rows(trials_path(tmp_path / "results", code), rows)
+    write_rows(ratings_path(tmp_path / "results", "P01"), rating_rows("P01"))
+    report = reported(tmp_path / "results")
+    if way == "forward":
+        (section,) = direction_section(report)
+        assert "there is neither d′ nor criterion" in section.paragraphs[0]
+        return
+    (one, *_) = (entry for entry in report.statistics.excluded if entry.experiment == "direction")
+    assert one.rule == "the measure is of forward trials"
+    assert "apart" not in one.remedy
+    said = people_left_out(report, "direction", frozenset())
+    assert said == "3 further participants were left out: 3 for lack of forward trials."
 
 
 def test_a_time_of_exactly_0_is_told_as_a_reason_for_having_none(tmp_path: Path, reported: Reported) -> None:

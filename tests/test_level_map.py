@@ -67,6 +67,8 @@ def test_where_nobody_has_a_threshold_among_the_levels_no_mean_is_told(lab: Path
     (lab / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *rows]) + "\n")
     (told,) = thresholds_in_short(mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")).items
     assert told == "Threshold in voltage in V, mean over people: links: nobody has one within the levels."
+    (row,) = (line for line in (lab / "out" / "report.md").read_text().splitlines() if line.startswith("| links | 2 |"))
+    assert row == "| links | 2 | – | – | – | – | – | 2 |"
 
 
 @pytest.mark.parametrize(

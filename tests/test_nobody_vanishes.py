@@ -166,6 +166,21 @@ def test_the_same_code_that_has_begun_at_another_lab_is_another_person(tmp_path:
     assert [one.participant for one in found.absent if one.state.startswith("begun")] == ["oslo/P01"]
 
 
+def test_synthetic_participants_beside_people_are_in_no_count(tmp_path: Path) -> None:
+    ran(tmp_path, "S01")
+    register.append(tmp_path, register.entry("joined", "S01", facts={}), VirtualClock())
+    for code in ("P01", "P02"):
+        rows = [row | {"rating_by": "participant", "gun": "RG-2:0007"} for row in rating_rows(code, int(code[1:]))]
+        write_rows(ratings_path(tmp_path, code), rows)
+    logs = read_logs([tmp_path])
+    found = with_everybody(summarize(logs), logs)
+    assert [one.participant for one in found.excluded] == ["S01"]
+    assert found.participation is not None
+    counts = found.participation.experiments["preference"]
+    assert (counts.analysed, counts.left_out, counts.not_done) == (2, 0, 0)
+    assert found.participation.absent == ()
+
+
 @pytest.mark.parametrize("command", ["analyze", "export"])
 def test_of_unfinished_runs_alone_it_is_said_how_to_go_on(recoil: Recoil, tmp_path: Path, command: str) -> None:
     path = broken_off(tmp_path / "results", "P01", 9)

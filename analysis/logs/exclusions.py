@@ -73,6 +73,13 @@ _ABSENT = (
 )
 
 
+NOT_COUNTED = (
+    "the measure is of forward trials",
+    "see whether `direction` says which way each shot went; of backward shots alone there is no test",
+)
+"""The rule, and what to do, of who has trials with a method, and none of the direction that counts."""
+
+
 def shared_methods(table: pd.DataFrame) -> set[str]:
     """The methods that a test compares: each is one of half of the people at least.
 
@@ -113,12 +120,13 @@ def _incomplete(table: pd.DataFrame, experiment: str, methods: Sequence[str]) ->
         for i in np.flatnonzero(missing)
     }
     counted = slice(None) if measure.direction is None else np.asarray(table["direction"] == measure.direction)
-    seen = np.zeros((len(codes), len(methods)), dtype=np.bool_)
+    seen, there = (np.zeros((len(codes), len(methods)), dtype=np.bool_) for _ in range(2))
     seen[person[counted], method[counted]] = True
+    there[person, method] = True
     absent = {
         codes[i]: (
-            f"{measure.absent} {', '.join(name for name, there in zip(methods, seen[i], strict=True) if not there)}",
-            *_ABSENT,
+            f"{measure.absent} {', '.join(name for name, has in zip(methods, seen[i], strict=True) if not has)}",
+            *(NOT_COUNTED if there[i].all() else _ABSENT),
         )
         for i in np.flatnonzero(~seen.all(axis=1))
     }

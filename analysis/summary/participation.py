@@ -55,8 +55,10 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
     begun = {(logs.person(run.file.study, run.file.participant), run.file.experiment): run for run in logs.begun}
     runs = [(logs.person(run.study, run.participant), run) for run in logs.runs]
     joined = {logs.person(study, one.participant_id) for study, one in logs.joined}
-    people = set().union(joined, *within.values(), (who for who, _ in why), (who for who, _ in begun))
-    people |= {who for who, _ in runs}
+    people = set().union(*within.values(), (who for who, _ in why), (who for who, _ in begun))
+    nobody = {one.participant for one in excluded if one.rule == NEVER_TOGETHER} - people  # of another kind of data
+    runs = [(who, run) for who, run in runs if who not in nobody]
+    people |= (joined - nobody) | {who for who, _ in runs}
     done = [*why, *begun, *((who, run.experiment) for who, run in runs)]
     done += [(who, name) for name, some in within.items() for who in some]
     names = list(dict.fromkeys([*within, *(name for _, name in why), *(run.experiment for _, run in runs)]))

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from analysis.logs.exclusion_rules import BY_HAND
-from analysis.logs.exclusions import FINISHED, LeftOut
+from analysis.logs.exclusions import FINISHED, NOT_COUNTED, LeftOut
 from analysis.logs.kinds import IN_REGISTER, NEVER_TOGETHER
 from analysis.report import apa
 from analysis.report.labels import named
@@ -20,6 +20,7 @@ _WORDS = {
     "every trial is answered": "for unanswered trials",
     "every method is rated": "for a missing rating",
     "everybody has every method": "for lack of a method",
+    NOT_COUNTED[0]: "for lack of forward trials",
     "min_kept_share": "for too few trials kept{}",
     "max_same_response_share": "for giving the same answer too often{}",
     "accuracy": "for too few right answers{}",

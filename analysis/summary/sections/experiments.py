@@ -264,9 +264,13 @@ def preference_means(found: WithinStatistics) -> Table:
 
 _DIRECTION_NOTE = (
     "The measure is the share of right answers on forward shots. Forward trials alone mix sensitivity with the "
-    "readiness to say forward, so d′ and criterion over both directions stand beside it (log-linear correction; a "
-    "criterion below 0 leans towards forward)."
+    "readiness to say forward"
 )
+_BOTH_DIRECTIONS = (
+    ", so d′ and criterion over both directions stand beside it (log-linear correction; a criterion below 0 leans "
+    "towards forward)."
+)
+_ONE_DIRECTION = "; without backward trials nothing tells one from the other, so there is neither d′ nor criterion."
 
 
 def direction_section(report: ReportData) -> Iterator[Section]:
@@ -274,9 +278,10 @@ def direction_section(report: ReportData) -> Iterator[Section]:
     found = report.statistics.direction
     if found is None or not found.n:
         return
+    note = _DIRECTION_NOTE + (_BOTH_DIRECTIONS if any(found.sensitivity.values()) else _ONE_DIRECTION)
     yield Section(
         title="Direction recognition",
-        paragraphs=(_DIRECTION_NOTE, " ".join([_binomial_sentence(found), *([found.binomial_note] * (found.n > 1))])),
+        paragraphs=(note, " ".join([_binomial_sentence(found), *([found.binomial_note] * (found.n > 1))])),
         pictures=(directions_picture(found),),
         tables=(
             direction_means(found),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from analysis.psychometric.fit import Credible
-from analysis.psychometric.people import FEWEST_ANSWERS, PersonFit
+from analysis.psychometric.people import FEWEST_ANSWERS, GroupFit, PersonFit
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Picture, Section, Table
@@ -51,10 +51,15 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
 def _group_words(one: ConditionFit, digits: int | None) -> str:
     if one.group is None:
         return ""
-    if one.group.without == one.group.people:
+    if not _has_threshold(one):
         return "nobody has one within the levels"
     jnd = _number(one.group.jnd.median, digits)
     return f"{_number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}"
+
+
+def _has_threshold(one: ConditionFit) -> bool:
+    """Whether the group's mean rests on anybody's threshold, and not on the prior alone."""
+    return one.group is not None and one.group.without < one.group.people
 
 
 def _measure(of: Thresholds) -> str:
@@ -211,9 +216,7 @@ def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int | None
             (
                 *_cells(found, one.levels),
                 str(one.group.people),
-                *_estimate(one.group.threshold, digits),
-                _number(one.group.sd.median, digits),
-                *_estimate(one.group.jnd, digits),
+                *(_group_cells(one.group, digits) if _has_threshold(one) else (apa.NO_NUMBER,) * 5),
                 str(one.group.without),
             )
             for one in of.conditions
@@ -222,7 +225,12 @@ def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int | None
     )
 
 
+def _group_cells(one: GroupFit, digits: int | None) -> tuple[str, ...]:
+    return *_estimate(one.threshold, digits), _number(one.sd.median, digits), *_estimate(one.jnd, digits)
+
+
 def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int | None) -> Table:
+    measured = [one.levels for one in of.conditions if _has_threshold(one)]
     return Table(
         caption=f"{asked}: differences of the {_measure(of)}; without correction for their number",
         header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
@@ -231,7 +239,11 @@ def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int |
                 " − ".join(_condition(found, side).removesuffix(": ") for side in (one.a, one.b)),
                 str(one.threshold.people),
                 "yes" if one.threshold.within else "no",
-                *_estimate(one.threshold.difference, digits),
+                *(
+                    _estimate(one.threshold.difference, digits)
+                    if one.a in measured and one.b in measured
+                    else (apa.NO_NUMBER,) * 2
+                ),
             )
             for one in of.differences
         ),
