@@ -13,7 +13,7 @@ import pytest
 from analysis.logs.exclusions import IN_NO_TEST, LeftOut
 from analysis.logs.reading import read_logs
 from analysis.logs.setups import SetupOfLog, changed_setups
-from analysis.summary.analyze import with_everybody
+from analysis.summary.analyze import Request, analyze, with_everybody
 from analysis.summary.participation import PersonInExperiment, exclusion_lines
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
@@ -250,3 +250,16 @@ def test_a_copy_of_a_folder_leaves_out_nobody_and_the_original_stays(tmp_path: P
     counts = statistics.participation.experiments["preference"]
     assert (counts.analysed, counts.left_out, counts.not_done) == (2, 0, 0)
     assert statistics.participation.absent == ()
+
+
+def test_what_is_said_of_logs_that_were_used_stands_in_the_statistics(tmp_path: Path) -> None:
+    results = tmp_path / "results"
+    for code in ("P01", "P02"):
+        ran(results, code)
+    journal(results, "preference").unlink()
+    (results / "sub-P02" / "sub-P02_task-preference_ratings.csv").unlink()
+    analyze(Request(paths=(results,), out=tmp_path / "out"))
+    found = json.loads((tmp_path / "out" / "statistics.json").read_text(encoding="utf-8"))
+    assert any("has no journal" in one or "have no journal" in one for one in found["log_remarks"])
+    assert any("its table is missing, so it was made again" in one for one in found["log_remarks"])
+    assert str(tmp_path) not in json.dumps(found["log_remarks"])

@@ -281,7 +281,7 @@ def test_a_report_of_two_thousand_stays_short(crowded: ReportData, tmp_path: Pat
         "the first 50 of 2,000; everybody is in preference_wide.csv",
         "\n- and 1,950 more log files\n",
         "\n- and 1,988 more, listed in the appendix\n",
-        "\n- and 1,950 more left out\n",
+        "\n- and 1,950 more, all in statistics.json: who was left out under “excluded”, the rest under “log",
         "2,000 synthetic participants",
     ):
         assert words in text

@@ -165,6 +165,13 @@ def left_out_by_files(logs: Logs) -> tuple[LeftOut, ...]:
     return (*bad, *begun)
 
 
+def log_remarks(logs: Logs) -> tuple[str, ...]:
+    """What there is to say of logs that count, and of files that leave nobody out. No path says on which machine."""
+    said = [*(one for one in logs.problems if not one.study), *logs.remarks, *logs.notes]
+    root = folder_above([*logs.files, *(one.file for one in (*logs.problems, *logs.remarks, *logs.notes))])
+    return tuple(below(one, name_below(one.file, root).parent) for one in said)
+
+
 _RULE = re.compile(r"\(rule: (.*)\)")
 _COMMAND = re.compile(r"`((?:recoil |--|include_)[^`]*)`")
 

@@ -11,7 +11,7 @@ from pydantic import JsonValue
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusion_rules import ExclusionEffect, Rules, apply_rules
-from analysis.logs.exclusions import by_study, left_out_by_files
+from analysis.logs.exclusions import by_study, left_out_by_files, log_remarks
 from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
@@ -156,7 +156,11 @@ def _analysis(
     frozen, edited = deviations(first, used) if request.against_frozen else ((), ())
     warnings = (*main.statistics.warnings, *_without_effect((main, *others)), *unchecked_languages(logs.runs))
     statistics = replace(
-        main.statistics, kept_apart=kept_apart or None, preregistration=frozen or None, warnings=warnings
+        main.statistics,
+        kept_apart=kept_apart or None,
+        preregistration=frozen or None,
+        warnings=warnings,
+        log_remarks=log_remarks(logs) or None,
     )
     told = _told(main, files.mapping)
     compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))

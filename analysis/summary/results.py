@@ -349,13 +349,15 @@ class StudyStatistics(NotebookResult):
 
     `designs` by their names, which stand beside the two experiments in the file. All are of one kind of data, which
     `data_kind` names; those of other kinds, if they were asked for, are `kept_apart` in the same form. `labels`: what
-    methods are called in print, where that is not their code.
+    methods are called in print, where that is not their code. `log_remarks`: what there is to say of logs that were
+    used, and of files that are no logs.
     """
 
     direction: DirectionStatistics | None = field(default=None, metadata=OPTIONAL)
     preference: WithinStatistics | None = field(default=None, metadata=OPTIONAL)
     designs: Mapping[str, DesignSummary] = field(default_factory=dict, metadata=SPREAD)
     excluded: tuple[LeftOut, ...] = ()
+    log_remarks: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
     participation: Participation | None = field(default=None, metadata=OPTIONAL)
     warnings: tuple[str, ...] = ()
     labels: Mapping[str, str] | None = field(default=None, metadata=OPTIONAL)

@@ -11,7 +11,7 @@ from analysis.logs.column_map import NOT_STATED
 from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut
 from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.report import apa
-from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table, shortened
+from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table
 from analysis.summary.participation import PeopleOfExperiment
 from analysis.summary.results import DesignSummary, Origin, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
@@ -127,7 +127,9 @@ def _on(gun: str) -> str:
 def all_left_out(report: ReportData) -> Iterator[Section]:
     """The appendix' list of who and what was left out where it is too long for the top, and who is missing in which."""
     gone, tables = left_out_lines(report), tuple(_absent_people(report))
-    listed = shortened(gone, "left out") if len(gone) > _NAMED else ()
+    rest = f"{len(gone) - SHOWN:,} more, all in statistics.json: who was left out under “excluded”, the rest under "
+    every = gone if len(gone) <= LISTED else (*gone[:SHOWN], f"and {rest}“log_remarks”")
+    listed = every if len(gone) > _NAMED else ()
     if listed or tables:
         title = "Everybody and everything left out"
         yield Section(title=title, items=listed, tables=tables, appendix=True, folded=True)
@@ -175,7 +177,7 @@ def _rule(entry: LeftOut) -> tuple[str, str, str]:
 def _rule_line(report: ReportData, entries: list[LeftOut]) -> str:
     first = entries[0]
     people = [f"{entry.participant} ({entry.reason})" for entry in entries[:_NAMED]]
-    people += [f"and {len(entries) - _NAMED:,} more"] if len(entries) > _NAMED else []
+    people += [f"and {len(entries) - _NAMED:,} more, all in statistics.json"] if len(entries) > _NAMED else []
     rule = f" Rule: {first.rule}." if first.rule else ""
     remedy = f" Remedy: {first.remedy}." if first.remedy else ""
     count, tests = how_many(len(entries), "participant"), " of tests" if first.rule == IN_NO_TEST else ""
