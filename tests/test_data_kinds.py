@@ -12,7 +12,7 @@ import pytest
 import recoil as public
 from analysis.logs.reading import read_logs
 from analysis.stats.anova import rm_anova
-from analysis.summary.analyze import Request, result_files
+from analysis.summary.analyze import Request, analyze, result_files
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
@@ -277,3 +277,14 @@ def test_an_entry_of_the_rules_that_means_somebody_in_data_of_one_kind_is_not_ca
     found = json.loads(result_files(request)["statistics.json"])
     assert [one for one in found["warnings"] if "no log here" in one] == ["the rules exclude P77, who has no log here"]
     assert "P02" in [one["participant"] for one in found["kept_apart"]["synthetic"]["excluded"]]
+
+
+def test_tables_of_data_that_were_kept_apart_before_are_named_as_left_there(
+    mixed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    (out / "synthetic").mkdir(parents=True)
+    for name in ("statistics.json", "report.md", "synthetic/preference_long.csv", "synthetic/direction_wide.csv"):
+        (out / name).write_text("of before", encoding="utf-8")
+    analyze(Request(paths=(mixed,), out=out))
+    assert "left there: synthetic/direction_wide.csv, synthetic/preference_long.csv" in capsys.readouterr().err

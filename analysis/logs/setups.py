@@ -17,6 +17,8 @@ from experiments.study.preregistration import Files, changed_keys, plain_value
 
 _NAMED = 20
 """So many people, and so many keys, are named."""
+_SETUPS, _FEW = 3, 5
+"""Of more setups than these so many are told, each by so many people and keys."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,34 +49,38 @@ def _told(setups: Mapping[str, list[SetupOfLog]]) -> Problem:
     """The setup of most logs, and how each other one differs from it."""
     first, *others = sorted(setups.values(), key=len, reverse=True)
     one, count = first[0], sum(map(len, setups.values()))
-    differing = "; ".join(f"{_people(some)} with {_differences(one, some[0])}" for some in others)
+    most = _NAMED if len(others) <= _SETUPS else _FEW
+    differing = "; ".join(f"{_people(some, most)} with {_differences(one, some[0], most)}" for some in others[:_SETUPS])
+    if len(others) > _SETUPS:
+        more, rest = how_many(sum(map(len, others[_SETUPS:])), "run"), len(others) - _SETUPS
+        differing += f"; and {more} with {rest} other setups, which the first line of each journal holds"
     message = (
         f"{how_many(count, 'run')} of {one.experiment} were made with {len(setups)} setups (config and gun) and count "
-        f"together: {_people(first)} with one, {differing}; if that matters, analyse them apart: name their folders in "
-        "a call of its own"
+        f"together: {_people(first, most)} with one, {differing}; if that matters, analyse them apart: name their "
+        "folders in a call of its own"
     )
     return Problem(file=Path(one.study), line=None, column=None, message=message, experiment=one.experiment)
 
 
-def _people(logs: Sequence[SetupOfLog]) -> str:
-    return first_few([log.code for log in logs], _NAMED)
+def _people(logs: Sequence[SetupOfLog], most: int) -> str:
+    return first_few([log.code for log in logs], most)
 
 
-def _differences(first: SetupOfLog, other: SetupOfLog) -> str:
+def _differences(first: SetupOfLog, other: SetupOfLog, most: int) -> str:
     """What differs between the setups of two logs, as far as their journals can be read."""
     with suppress(JournalError):
-        return setup_differences(_setup(first), _setup(other))
+        return setup_differences(_setup(first), _setup(other), most)
     return "another setup"
 
 
-def setup_differences(before: Files, after: Files) -> str:
-    """The keys that differ between two setups, each with both values."""
+def setup_differences(before: Files, after: Files, most: int = _NAMED) -> str:
+    """The keys that differ between two setups, each with both values; so many at most."""
     changes = [
         f"{file} {change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
         for file in ("experiment", "gun")
         for change in changed_keys(file, before.get(file, {}), after.get(file, {}))
     ]
-    return first_few(changes, _NAMED)
+    return first_few(changes, most)
 
 
 def _setup(log: SetupOfLog) -> Files:

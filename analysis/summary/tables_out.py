@@ -10,26 +10,29 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import get_args
 
 import numpy as np
 import pandas as pd
 
 from analysis.logs.design_logs import DesignLogs
+from analysis.logs.kinds import folder_of
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
 from analysis.summary.designs import answer_scores, varied
 from analysis.summary.results import WithinStatistics
 from analysis.times.own_trials import timed
 from experiments.design.language import QuestionConfig
-from experiments.record.tables import guard, is_rated
+from experiments.record.tables import DataKind, guard, is_rated
 from experiments.tasks.questions import correct_columns
 
 MAX_NAME = 64
 _KEYS = [STUDY, "participant_id", "method"]
 
 
-TABLE_FILES = ("*_long.csv", "*_wide.csv")
-"""What the files of tables are called."""
+_TABLES = ("*_long.csv", "*_wide.csv")
+TABLE_FILES = (*_TABLES, *(f"{folder_of(kind)}/{name}" for kind in get_args(DataKind) for name in _TABLES))
+"""What the files of tables are called, those of data that are kept apart too."""
 
 
 def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[str, bytes]:
