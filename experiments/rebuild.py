@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from experiments.config.door import ConfigError, checked_table
@@ -34,6 +37,31 @@ def table(contents: Contents) -> bytes:
     design = began_with(contents.head)
     rows = design_table.design_rows(contents.plan, replay.history(contents), design)
     return table_bytes(design_columns.columns(design), rows)
+
+
+def rows_beyond(content: bytes, made: bytes) -> int:
+    r"""How many rows a table holds more of than the one that its journal makes; 0 if they differ in any other way.
+
+    >>> rows_beyond(b"trial,said\n1,yes\n2,no\n", b"trial,said\n1,yes\n2,\n")
+    1
+    """
+    try:
+        ours, theirs = ([*csv.reader(io.StringIO(some.decode(), newline=""))] for some in (content, made))
+    except (UnicodeDecodeError, csv.Error):
+        return 0
+    more = len(ours) - len(theirs)  # of shots there are as many rows as there were; of trials, as were planned
+    differing = [pair for pair in zip(ours, theirs, strict=False) if pair[0] != pair[1]]
+    if more < 0 or not all(_holds_more(*pair, first=i == 0) for i, pair in enumerate(differing)):
+        return 0
+    return len(differing) + more
+
+
+def _holds_more(row: Sequence[str], made: Sequence[str], *, first: bool) -> bool:
+    """Whether a row says what was made says, and more; of the `first`, a journal may end in the middle of its trial."""
+    if len(row) != len(made):
+        return False
+    more = any(cell and not known for cell, known in zip(row, made, strict=True))
+    return more and (first or all(cell == known or not known for cell, known in zip(row, made, strict=True)))
 
 
 def shots_table(contents: Contents) -> bytes | None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from analysis.report.terminal import say
 from device.serial_gun.gun import speed_of
-from device.words import few_of_each, said_by
+from device.words import few_of_each, how_many, said_by
 from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.door import ConfigError
@@ -20,7 +20,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.shown_texts import letters_of
 from experiments.live_run import RunStopped, Screen
-from experiments.rebuild import rebuild, shots_table
+from experiments.rebuild import rebuild, rows_beyond, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
 from experiments.run import Finished, begun_language, language_begun_in, run
@@ -304,9 +304,27 @@ def _kept(table: Path, data: bytes, messages: list[str]) -> bool:
     if _holds(table, data):
         return True
     if os.path.lexists(table):
-        messages.append(f"{table}: differed from its journal and was set aside as {storage.set_aside_file(table)}")
+        beyond = _rows_beyond(table, data)
+        aside = storage.set_aside_file(table)
+        messages.append(f"{table}: differed from its journal and was set aside as {aside}{_lost(beyond)}")
     storage.write_whole(table, data)
     return False
+
+
+def _rows_beyond(table: Path, data: bytes) -> int:
+    """How many rows a table that stands there holds more of; 0 of what is no table of about that size."""
+    try:
+        return rows_beyond(storage.read(table, 10 * len(data)), data)
+    except OSError:
+        return 0
+
+
+def _lost(rows: int) -> str:
+    """What is said where the table that was set aside holds more than the one that took its place."""
+    if not rows:
+        return ""
+    said = f"it holds more than the journal in {how_many(rows, 'row')}, which the table made now lacks"
+    return f"; {said}: if the journal is cut short, put it back whole, and the table that was set aside in its place"
 
 
 def rebuild_table(path: Path) -> RebuiltTable:

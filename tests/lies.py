@@ -629,7 +629,7 @@ _JOURNALS: tuple[_Told, ...] = (
     (
         "cut off in the middle",
         in_journal("direction", lambda found: found.__delitem__(slice(90, None))),
-        "not what its journal",
+        "holds more than its journal, which is cut short",
     ),
     (
         "cut off, and the table gone",

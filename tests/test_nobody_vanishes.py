@@ -23,6 +23,7 @@ from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
+from recoil.session import rebuild_table
 from tests.conftest import Recoil, refused
 from tests.lies import journal, lines, table
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
@@ -63,6 +64,17 @@ def test_a_gun_that_was_changed_within_a_study_is_told(
     done = recoil("analyze", "results", "--out", "out")
     assert (done.returncode, "were made with 2 setups" in done.stderr) == (1, True)
     assert "were made with 2 setups" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_of_very_many_setups_a_few_are_told_and_where_the_others_are() -> None:
+    logs = [
+        SetupOfLog(study="a", kind="real", experiment="direction", code=f"P{n:03}", path=f"P{n}.csv", setup=f"{n}")
+        for n in range(1, 121)
+    ]
+    (told,) = changed_setups(logs)
+    assert "120 runs of direction were made with 120 setups" in told.message
+    assert "and 116 runs with 116 other setups, which the first line of each journal holds" in told.message
+    assert len(told.message) < 600
 
 
 def test_data_of_two_kinds_do_not_count_together_whatever_their_setups() -> None:
@@ -263,3 +275,31 @@ def test_what_is_said_of_logs_that_were_used_stands_in_the_statistics(tmp_path: 
     assert any("has no journal" in one or "have no journal" in one for one in found["log_remarks"])
     assert any("its table is missing, so it was made again" in one for one in found["log_remarks"])
     assert str(tmp_path) not in json.dumps(found["log_remarks"])
+
+
+@pytest.mark.parametrize("experiment", ["direction", "preference", "realism"])
+def test_a_table_that_holds_more_than_its_cut_journal_is_not_to_be_rebuilt(experiment: str, tmp_path: Path) -> None:
+    ran(tmp_path, "P01", experiment)
+    (path,) = tmp_path.glob(f"sub-P01/*{experiment}_journal.jsonl")
+    records = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(records[: len(records) // 2]) + records[len(records) // 2][:20])
+    (problem,) = read_logs([tmp_path]).problems
+    assert "holds more than its journal, which is cut short: " in problem.message
+    assert "do not rebuild the table" in problem.message
+    assert "`recoil rebuild" not in problem.message
+    made = rebuild_table(path)
+    rows = problem.message.partition("nothing proves ")[2].partition(" of it")[0]
+    assert f"it holds more than the journal in {rows}, which" in "".join(made.messages)
+
+
+def test_an_answer_that_a_journal_says_otherwise_is_edited_though_the_journal_is_cut(tmp_path: Path) -> None:
+    ran(tmp_path, "P01")
+    path = journal(tmp_path, "preference")
+    records = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(records[:-1]))
+    of_run = table(tmp_path, "preference")
+    first, second, *rest = of_run.read_bytes().split(b"\r\n")
+    of_run.write_bytes(b"\r\n".join([first, second.replace(b",1,,", b",2,,"), *rest]))
+    (problem,) = read_logs([tmp_path]).problems
+    assert "is not what its journal says: edited" in problem.message
+    assert not any("holds more" in one for one in rebuild_table(path).messages)

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.words import first_few, how_many
-from experiments.rebuild import JOURNAL_NAME, began_with, misnamed, table
+from experiments.rebuild import JOURNAL_NAME, began_with, misnamed, rows_beyond, table
 from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError
 from experiments.record.tables import FILE_SUFFIX, DataKind
@@ -179,11 +179,22 @@ def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) 
         known = "the table is still the one of the finished run" if finished else "so nothing proves the table"
         return f"its journal cannot be trusted, {known}: {_without(where, error)}"
     if made != content:
-        how = f"edited, or the run went on since; `recoil rebuild {where}` makes it anew"
-        raise _edited(where, data, content, f"is not what its journal says: {how}")
+        raise _edited(where, data, content, _differs(where, rows_beyond(content, made), finished=finished))
     if finished:
         return "its journal was changed and says the same as before"
     return "its run is not finished; the table holds what was answered so far, and `recoil run ... --resume` goes on"
+
+
+def _differs(where: str, beyond: int, *, finished: bool) -> str:
+    """What is said of a table that is not what its journal says; `beyond`: so many rows hold more, the rest agrees."""
+    if beyond and not finished:
+        return (
+            f"holds more than its journal, which is cut short: nothing proves {how_many(beyond, 'row')} of it, and "
+            f"the others agree; put the whole journal, as from a backup, in the place of {Path(where).name}; "
+            "do not rebuild the table, which would lose these"
+        )
+    how = f"edited, or the run went on since; `recoil rebuild {where}` makes it anew"
+    return f"is not what its journal says: {how}"
 
 
 def _without(path: str, error: JournalError) -> str:
