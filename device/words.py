@@ -51,18 +51,32 @@ def few_of_each(messages: Iterable[str]) -> Iterator[str]:
     ['P4: no answer', '... and 195 more like it']
     >>> list(few_of_each(["a", *(f"P{n}: edited; `recoil rebuild /x/{n}` helps" for n in range(7))]))[-1]
     '... and 2 more like it (edited)'
+    >>> list(few_of_each(["a", *(f"or P{n}, and P{n} beside it" for n in range(7))]))[-1]
+    '... and 2 more like it'
     """
     seen: Counter[str] = Counter()
     for message in messages:
-        kind = _PARTICULARS.sub("", message)
+        kind = _PARTICULARS.sub(_ANY, message)
         seen[kind] += 1
         if seen[kind] <= _LIKE:
             yield message
     for kind, count in seen.items():
         if count > _LIKE:
-            tail = kind.rpartition(": ")[2] if len(seen) > 1 else ""
-            said = tail if tail.count("`") % 2 == 0 else tail.partition("`")[0].rstrip("; ")
-            yield f"... and {count - _LIKE} more like it{f' ({said.strip()})' if said else ''}"
+            said = _whole_clause(kind) if len(seen) > 1 else ""
+            yield f"... and {count - _LIKE} more like it{f' ({said})' if said else ''}"
+
+
+_ANY = "\0"
+"""Stands where messages of a kind have names, numbers and quotes of their own."""
+_ASIDE = re.compile(r" \([^()]*\)")
+
+
+def _whole_clause(kind: str) -> str:
+    """The first clause behind the place that all messages of a kind share to the letter; empty if each has a hole."""
+    clauses = [one.strip() for one in re.split(r"[:;]\s", _ASIDE.sub("", kind))]
+    first = next((number for number, one in enumerate(clauses) if _ANY in one), 0)
+    shared = (one.removeprefix(_ANY).strip() for one in clauses[first:])
+    return next((one for one in shared if one and not set(one) & {_ANY, "(", ")"} and one.count("`") % 2 == 0), "")
 
 
 def escaped(text: str, kept: str = "") -> str:

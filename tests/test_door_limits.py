@@ -127,3 +127,15 @@ def test_like_problems_of_files_are_counted_by_what_is_wrong() -> None:
         "b.csv: is empty",
         "... and 195 more like it (is not allowed)",
     ]
+
+
+def test_of_like_problems_only_a_clause_without_holes_is_repeated() -> None:
+    def last(*said: str) -> str:
+        return [*few_of_each(["b.csv: is empty", *said])][-1]
+
+    copies = (f"left out: /x/{n}.csv: holds what y/{n}.csv holds (rule: a run counts once); read one" for n in range(9))
+    assert last(*copies) == "... and 4 more like it (read one)"
+    kinds = (f"left out: /x/{n}.csv: is of synthetic people (rule: never together); read it apart" for n in range(9))
+    assert last(*kinds) == "... and 4 more like it (is of synthetic people)"
+    begun = (f"P{n} has begun preference and not finished it ({n} of 3); go on as P{n} (or {n})" for n in range(9))
+    assert last(*begun) == "... and 4 more like it"
