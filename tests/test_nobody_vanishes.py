@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from analysis.logs.exclusions import IN_NO_TEST, LeftOut
+from analysis.logs.journals import gone
 from analysis.logs.reading import read_logs
 from analysis.logs.setups import SetupOfLog, changed_setups
 from analysis.summary.analyze import Request, analyze, with_everybody
@@ -303,3 +304,10 @@ def test_an_answer_that_a_journal_says_otherwise_is_edited_though_the_journal_is
     (problem,) = read_logs([tmp_path]).problems
     assert "is not what its journal says: edited" in problem.message
     assert not any("holds more" in one for one in rebuild_table(path).messages)
+
+
+def test_whoever_has_several_logs_without_a_journal_is_named_once() -> None:
+    logs = [("a", code, has) for code, has in (("P01", False), ("P01", False), ("P02", False), ("P03", True))]
+    (told,) = gone(logs)
+    assert "3 of 4 logs have no journal beside them" in told.message
+    assert "nothing proves them: P01, P02;" in told.message

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,15 @@ def test_reasons_stand_where_there_are_no_numbers(tmp_path: Path) -> None:
     assert "Friedman test: Every participant scores all conditions alike" in told
     assert "None" not in told
     assert "nan" not in told
+
+
+def test_odds_that_nobody_reads_to_the_last_digit_are_printed_as_bounds(tmp_path: Path) -> None:
+    statistics = study_of(tmp_path, RIGHT)
+    assert statistics.direction is not None
+    model = statistics.direction.model
+    first, *rest = model.fit.contrasts
+    wide = replace(model.fit, contrasts=(replace(first, ci_low=3e-9, ci_high=7.4e16), *rest))
+    direction = replace(statistics.direction, model=replace(model, fit=wide))
+    (section,) = supplement_sections(ReportData(title="T", statistics=replace(statistics, direction=direction)))
+    (table,) = (table for table in section.tables if "Odds ratios" in table.caption)
+    assert table.rows[0][2] == "[< 0.01, > 1000]"

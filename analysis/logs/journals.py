@@ -230,5 +230,5 @@ def _gone(codes: list[str], count: int) -> str:
         return f"{has} beside it, which every run writes, so nothing proves what is there; put the journals back"
     return (
         f"{len(codes)} of {count} logs have no journal beside them, as the others have, so nothing proves them: "
-        f"{first_few(codes, 20)}; put the journals back"
+        f"{first_few([*dict.fromkeys(codes)], 20)}; put the journals back"
     )

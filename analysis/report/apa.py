@@ -110,6 +110,20 @@ def f_test(F: float | None, df: Sequence[float], p: float | None, *, exact: bool
     return f"F({of}) = {'undefined or infinite' if shown == NO_NUMBER else shown}, {p_value(p, exact=exact)}"
 
 
+def odds_cell(value: float | None) -> str:
+    """An odds ratio for a table: ends that nobody reads to the last digit are bounds.
+
+    >>> odds_cell(2.5), odds_cell(7.4e16), odds_cell(3e-9), odds_cell(None)
+    ('2.50', '> 1000', '< 0.01', '–')
+    """
+    if value is None or not math.isfinite(value) or _READ[0] <= value <= _READ[1]:
+        return number(value)
+    return f"> {_READ[1]}" if value > _READ[1] else f"< {_READ[0]}"
+
+
+_READ = 0.01, 1000
+
+
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:
     """A confidence interval.
 

@@ -161,7 +161,7 @@ def _coefficients(caption: str, found: Sequence[Coefficient]) -> Table:
 
 def _with_odds(table: Table, found: Sequence[Coefficient]) -> Table:
     """With the odds, which a coefficient multiplies; the intercept's are those of the references themselves."""
-    odds = tuple(apa.number(math.exp(min(one.estimate, 700.0))) for one in found)
+    odds = tuple(apa.odds_cell(math.exp(min(one.estimate, 700.0))) for one in found)
     rows = tuple((*row, cell) for row, cell in zip(table.rows, odds, strict=True))
     return replace(table, header=(*table.header, "Odds ratio"), rows=rows)
 

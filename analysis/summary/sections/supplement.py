@@ -187,8 +187,8 @@ def _model_table(found: DirectionStatistics) -> Table:
         rows=tuple(
             (
                 _pair(contrast),
-                apa.number(contrast.odds_ratio),
-                apa.interval(contrast.ci_low, contrast.ci_high),
+                apa.odds_cell(contrast.odds_ratio),
+                f"[{apa.odds_cell(contrast.ci_low)}, {apa.odds_cell(contrast.ci_high)}]",
                 apa.number(contrast.t),
                 str(contrast.df),
                 apa.p_cell(contrast.p_holm),
