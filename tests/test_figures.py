@@ -209,6 +209,24 @@ def test_no_whisker_reaches_a_title_and_no_legend_lies_over_curves(
     assert not any(legend.get_window_extent().overlaps(curves.get_window_extent()) for legend in shown[1].legends)
 
 
+@pytest.mark.parametrize("n", [999, 1_000, 10_000, 250_000])
+def test_panels_of_response_times_keep_their_height_however_many_trials_there_are(
+    n: int, statistics: StudyStatistics, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: (style.lay_out(figure), shown.append(figure)))
+    assert statistics.direction is not None
+    times = statistics.direction.response_times
+    counted = {
+        method: {way: spread and replace(spread, n=n) for way, spread in of.items()}
+        for method, of in times.directions.items()
+    }
+    many = replace(statistics.direction, response_times=replace(times, directions=counted))
+    figure_response_times(many, tmp_path / "never")
+    assert figure_files.touching(shown[0]) == []
+    assert all(axes.get_window_extent().height > 0.55 * shown[0].bbox.height for axes in shown[0].axes)
+
+
 def test_the_matrix_of_comparisons_has_its_last_edge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[Figure] = []
     monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))

@@ -293,8 +293,11 @@ def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> Non
                 _draw_box(axes, i + place, spread.percentiles, method_colour(i), filled=direction == "forward")
                 _draw_medians(axes, i + place, times, method, direction)
     axes.set_ylim(bottom=0.0)
-    counted = "" if len(methods) > MANY_METHODS else "n = "
-    name_ticks(axes, methods, [counted + _counts(times, m) for m in methods])
+    counts = [_counts(times, method) for method in methods]
+    if len(methods) <= MANY_METHODS:
+        apart = " / " if max(map(len, counts)) <= _SIDE_BY_SIDE else " /\n"
+        counts = [f"n = {one.replace(' / ', apart)}" for one in counts]
+    name_ticks(axes, methods, counts)
     axes.set_ylabel("response time [s]")
     axes.set_title("(b) By direction", loc="left", fontweight="bold")
     handles = [
@@ -303,6 +306,10 @@ def _draw_boxes(axes: Axes, times: ResponseTimes, methods: Sequence[str]) -> Non
     ]
     beside: Any = {"loc": "lower right", "bbox_to_anchor": (1.02, 1.0), "borderpad": 0.2, "columnspacing": 1.0}
     axes.legend(handles=handles, ncols=2, frameon=False, fontsize=8.0, handlelength=1.6, **beside)
+
+
+_SIDE_BY_SIDE = len("1,000 / 1,000")
+"""Longer counts of a few methods stand one above the other: side by side they would touch those of the next."""
 
 
 def _draw_box(axes: Axes, place: float, percentiles: Sequence[float], colour: str, *, filled: bool) -> None:
