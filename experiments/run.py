@@ -104,8 +104,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     if before is None:
         _refuse_excluded(place, registered)
     with _open_gun(request, stimuli, clock) as gun, ExitStack() as turn:
-        if before is None:
-            turn.enter_context(_own_turn(place, setup.config))
+        turn.enter_context(_own_turn(place, setup.config, before))
         plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
         stimuli.work_out(plan.trials)
         told: GrowingHistory = []
@@ -268,27 +267,9 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
         )
 
 
-_TURN_S = 20.0
-"""So long a run waits for another one that begins; with a sensor and a participant's screen that takes some seconds."""
-
-
-@contextmanager
-def _own_turn(place: Place, config: DesignConfig) -> Iterator[None]:
-    """Keep others from beginning a run here: which row of the order it gets hangs on the journals of those before it.
-
-    `PlaceError`: somebody else has been beginning one for too long.
-    """
-    if place.practice or not balance.is_balanced(config):
-        yield
-        return
-    storage.make_folder(place.results)
-    with storage.folder_held(place.results, _TURN_S) as is_ours:
-        if not is_ours:
-            raise PlaceError(
-                f"{place.results}: another console has been beginning a run here for {_TURN_S:g} s, and the order of "
-                "this one hangs on that; see to it, and begin again"
-            )
-        yield
+def _own_turn(place: Place, config: DesignConfig, before: Contents | None) -> AbstractContextManager[None]:
+    is_new = before is None and not place.practice
+    return folders.own_turn(place.results, config) if is_new else nullcontext()
 
 
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:

@@ -169,10 +169,10 @@ def test_keys_of_the_participants_own_that_are_the_consoles_are_refused(configs:
     ("keys", "others", "rates", "why"),
     [
         ("1 2", {"how": ("choice", "left right")}, False, ""),
-        ("left right", {"how": ("choice", "f b")}, False, r"questions.how: f, b would be a key of the console"),
-        ("1 2", {"much": ("rating", "")}, False, r"questions.response: 1, 2 would be typed .* for questions.much as"),
+        ("left right", {"how": ("choice", "f b")}, False, r"questions.how: f, b would be a key at the console"),
+        ("1 2", {"much": ("rating", "")}, False, r"1, 2 would be typed at the console as well .questions.much"),
         ("1 2", {"much": ("rating", "")}, True, ""),
-        ("1 2", {"much": ("number", "")}, True, r"questions.response: 1, 2 would be typed .* for questions.much as"),
+        ("1 2", {"much": ("number", "")}, True, r"1, 2 would be typed at the console as well .questions.much"),
         ("j k", {"words": ("text", "")}, False, r"questions.response: j, k would be typed"),
         ("left right", {"much": ("rating", ""), "words": ("text", "")}, False, ""),
     ],

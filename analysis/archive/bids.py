@@ -181,8 +181,7 @@ def long_name(name: str, unit: str = "") -> str:
     >>> long_name("exposure_s"), long_name("response_time_valid"), long_name("voltage_V_1", "V")
     ('Exposure', 'Response time valid', 'Voltage 1')
     """
-    words = re.sub(rf"_{re.escape(unit or 's')}(?=(_[0-9]+)?$)", "", name).replace("_", " ")
-    return words[:1].upper() + words[1:]
+    return re.sub(rf"_{re.escape(unit or 's')}(?=(_[0-9]+)?$)", "", name).replace("_", " ").capitalize()
 
 
 def readme(people: int, synthetic: int, *, free_text: bool) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
 from experiments.study import register
-from experiments.study.balance import group_of_next_run, row_of_next_run
+from experiments.study.balance import group_of_next_run, is_balanced, row_of_next_run
 from experiments.study.preregistration import (
     STUDY_FILE,
     FreezeStatus,
@@ -383,3 +383,26 @@ def _practised(where: Place) -> bool:
             if contents.finished and contents.head.participant == "person":
                 return True
     return False
+
+
+_TURN_S = 20.0
+"""So long a run waits for another one that begins; with a sensor and a participant's screen that takes some seconds."""
+
+
+@contextmanager
+def own_turn(results: Path, config: DesignConfig) -> Iterator[None]:
+    """Keep others from beginning a run here, where what it gets hangs on the journals of those before it.
+
+    `PlaceError`: somebody else has been beginning one for too long.
+    """
+    if not is_balanced(config):
+        yield
+        return
+    storage.make_folder(results)
+    with storage.folder_held(results, _TURN_S) as is_ours:
+        if not is_ours:
+            raise PlaceError(
+                f"{results}: another console has been beginning a run here for {_TURN_S:g} s, and the order of this "
+                "one hangs on that; see to it, and begin again"
+            )
+        yield

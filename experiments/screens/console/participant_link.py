@@ -6,7 +6,7 @@ Nobody waits for it: every question is asked in a thread of its own, and the exp
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from experiments.catalogues.catalogue import ENGLISH
@@ -52,18 +52,19 @@ def check_own_keys(setup: Setup[DesignConfig], *, rates: bool = False) -> None:
     typed = [name for name, one in questions.items() if not one.named_answers and one.kind not in on_page]
     for name, question in questions.items():
         if shared := shared_keys(question, questions.values()):
-            raise _no_key(setup, name, f"{', '.join(shared)} would be a key of the console as well")
+            raise _no_key(setup, name, shared)
         if typed and (letters := [one.own_key for one in choices(question) if len(one.own_key) == 1]):
-            field = f"{', '.join(letters)} would be typed into the console's field for questions.{typed[0]} as well"
-            raise _no_key(setup, name, field)
+            raise _no_key(setup, name, letters, typed[0])
 
 
-def _no_key(setup: Setup[DesignConfig], name: str, why: str) -> PlaceError:
-    answers = setup.config.questions[name].named_answers
-    keys = ", ".join(f'{one} = "{key}"' for one, key in zip(answers, _OWN, strict=False))
+def _no_key(setup: Setup[DesignConfig], name: str, keys: Sequence[str], field: str = "") -> PlaceError:
+    free = zip(setup.config.questions[name].named_answers, _OWN, strict=False)
+    beside = f" (questions.{field})" if field else ""
+    such = ", ".join(f'{one} = "{key}"' for one, key in free)
     return PlaceError(
-        f"--participant-keys: {setup.source}: questions.{name}: {why}, so nobody could tell who pressed it; give the "
-        f"answers keys of their own, such as keys = {{ {keys} }}"
+        f"--participant-keys: {setup.source}: questions.{name}: {', '.join(keys)} would be "
+        f"{'typed' if field else 'a key'} at the console as well{beside}, so nobody could tell who pressed "
+        f"it; give the answers keys of their own, such as keys = {{ {such} }}"
     )
 
 
