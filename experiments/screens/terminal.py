@@ -209,7 +209,7 @@ class TerminalScreen:
         free = words or _answers(position, line)
         if word in _COMMANDS and (line.startswith("/") or not free):
             return _command(word, rest.strip())
-        if "!" in line and not words:  # behind what was half typed
+        if "!" in line and not free:  # behind what was half typed
             return events.EmergencyStop()
         return _line(line, position, now_s)
 
