@@ -25,7 +25,7 @@ from experiments.design.streams import generator
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.rebuild import table
-from experiments.record import replay, storage
+from experiments.record import replay
 from experiments.record.journal import (
     Contents,
     Journal,
@@ -96,8 +96,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     shown, _ = setup_in(request.language, setup)
     stimuli = stimuli_of(setup.config, setup.gun)
     registered = register.read_register(request.results)
-    place = folders.place(request.results, request.participant_id, setup.config.experiment, registered)
-    place = replace(place, practice=request.practice, suffix=setup.config.table)
+    place = _place(request, registered)
     if not place.journal.exists():
         request = replace(request, anew_reason="")
     before = _before(place, request, clock)
@@ -136,6 +135,12 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
                 live.remark(Noted(trial=None, text=UNMEASURED))
             settle = recorder.settle if recorder else None
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
+
+
+def _place(request: RunRequest, registered: Register) -> Place:
+    config = request.setup.config
+    place = folders.place(request.results, request.participant_id, config.experiment, registered)
+    return replace(place, practice=request.practice, suffix=config.table)
 
 
 def _let_go(gun: Gun, why: BaseException) -> None:
@@ -365,10 +370,7 @@ def _open(place: Place, before: Contents | None, clock: Clock, *, each: bool) ->
     if before is not None:
         clock.go_on_after(before.records[-1].utc)
         return Journal.reopen(before, clock, each=each)
-    try:
-        storage.make_folder(place.folder)
-    except OSError as error:
-        raise PlaceError(f"{place.folder}: cannot be made ({error.strerror}); choose another --results") from error
+    folders.make_results(place.folder)
     return Journal.create(place.journal, clock, each=each)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from experiments.screens.console.participant_link import check_own_keys
 from experiments.study.folders import PlaceError
 from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import words
-from tests.designs import changed
+from tests.designs import changed, design
 
 pytest.importorskip("PyQt6")
 pytestmark = [pytest.mark.slow, needs_display]
@@ -195,6 +196,18 @@ def test_own_keys_are_held_against_all_that_the_console_takes(
         return
     with pytest.raises(PlaceError, match=why):
         check_own_keys(setup, rates=rates)
+
+
+@pytest.mark.parametrize("count", [4, 5])
+def test_where_the_console_has_a_field_arrows_alone_are_advised(count: int) -> None:
+    answers = list("abcde"[:count])
+    keys = dict(zip(answers, "12345", strict=False))
+    choice = {"kind": "choice", "text": "Which?", "answers": answers, "keys": keys}
+    config = design(questions={"response": choice, "much": {"kind": "number", "text": "How much?"}})
+    with pytest.raises(
+        PlaceError, match=r'free are left, right, up, down, as in keys = \{ a = "left", .* d = "down" \}$'
+    ):
+        check_own_keys(replace(load_setup("direction"), config=config))
 
 
 RANKED = """

@@ -195,12 +195,18 @@ def test_unplugged_between_shots_it_goes_on_after_replugging(tmp_path, tcp):
 
 
 def test_a_gun_that_comes_back_late_is_not_armed_by_what_was_pressed_before(tmp_path):
-    with a_pair(tmp_path, Troubles(replug_s=1.2 * ARM_WITHIN_S), speed=1.0) as pair:
-        pair.ready()
-        pair.twin.order(pair.twin.unplug)
-        wait_for(lambda: not is_up(pair.gun))
-        with pytest.raises(Disconnected, match=r"not armed: the gun was gone for more than 1 s"):
-            pair.gun.arm()
+    with a_pair(tmp_path, Troubles(replug_s=2.0 * ARM_WITHIN_S), speed=1.0) as pair:
+        why = ""
+        for _ in range(5):  # a busy machine may ask so late that the gun is back in time
+            pair.ready()
+            pair.twin.order(pair.twin.unplug)
+            wait_for(lambda: not is_up(pair.gun))
+            try:
+                pair.gun.arm()
+            except Disconnected as error:
+                why = str(error)
+                break
+        assert why == "not armed: the gun was gone for more than 1 s"
         assert pair.gun.status().state == "disarmed"
         assert pair.twin.body.ledger == []
         pair.ready()

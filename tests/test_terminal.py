@@ -282,6 +282,24 @@ def test_what_was_half_typed_does_not_swallow_an_emergency_stop(
     assert len(bodies(tmp_path, "fired")) == 1
 
 
+def test_an_answer_with_a_mark_is_an_answer(quick_configs: Path, tmp_path: Path) -> None:
+    design = quick_configs / "direction.toml"
+    text = design.read_text()
+    keys = 'keys = { forward = "up"'
+    assert keys in text
+    design.write_text(text.replace(keys, f'labels = {{ forward = "There!", backward = "back" }}\n{keys}'))
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.wait_for("and Enter:")
+        screen.type("d")
+        screen.wait_for(FIRES)
+        screen.type("")
+        screen.wait_for("t = There!")
+        screen.type("There!")
+        screen.wait_for("Saved. Trial 1: THERE!")
+        screen.type("stop")
+        assert screen.end() == 130
+
+
 def test_a_mark_within_words_is_a_mark(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
         screen.answer_trials(1)

@@ -385,6 +385,14 @@ def _practised(where: Place) -> bool:
     return False
 
 
+def make_results(folder: Path) -> None:
+    """Make a folder for results. `PlaceError`: it cannot be made."""
+    try:
+        storage.make_folder(folder)
+    except OSError as error:
+        raise PlaceError(f"{folder}: cannot be made ({error.strerror}); choose another --results") from error
+
+
 _TURN_S = 20.0
 """So long a run waits for another one that begins; with a sensor and a participant's screen that takes some seconds."""
 
@@ -398,7 +406,7 @@ def own_turn(results: Path, config: DesignConfig) -> Iterator[None]:
     if not is_balanced(config):
         yield
         return
-    storage.make_folder(results)
+    make_results(results)
     with storage.folder_held(results, _TURN_S) as is_ours:
         if not is_ours:
             raise PlaceError(

@@ -38,8 +38,9 @@ Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
 
 
-_OWN = ("left", "right", "up", "down", *"123456789")
-"""Keys that the console leaves to the participant."""
+_ARROWS = ("left", "right", "up", "down")
+_OWN = (*_ARROWS, *"123456789")
+"""Keys that the console leaves to the participant; where it has a field to type in, the arrows alone."""
 
 
 def check_own_keys(setup: Setup[DesignConfig], *, rates: bool = False) -> None:
@@ -58,13 +59,13 @@ def check_own_keys(setup: Setup[DesignConfig], *, rates: bool = False) -> None:
 
 
 def _no_key(setup: Setup[DesignConfig], name: str, keys: Sequence[str], field: str = "") -> PlaceError:
-    free = zip(setup.config.questions[name].named_answers, _OWN, strict=False)
+    answers, free = setup.config.questions[name].named_answers, _ARROWS if field else _OWN
     beside = f" (questions.{field})" if field else ""
-    such = ", ".join(f'{one} = "{key}"' for one, key in free)
+    such = ", ".join(f'{one} = "{key}"' for one, key in zip(answers, free, strict=False))
     return PlaceError(
         f"--participant-keys: {setup.source}: questions.{name}: {', '.join(keys)} would be "
-        f"{'typed' if field else 'a key'} at the console as well{beside}, so nobody could tell who pressed "
-        f"it; give the answers keys of their own, such as keys = {{ {such} }}"
+        f"{'typed' if field else 'a key'} at the console as well{beside}, so nobody could tell who pressed it; free "
+        f"are {', '.join(free)}, as in keys = {{ {such} }}"
     )
 
 
