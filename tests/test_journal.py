@@ -3,6 +3,7 @@ import os
 import stat
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -435,10 +436,28 @@ def test_a_file_that_cannot_be_replaced_leaves_no_part_behind(tmp_path: Path) ->
     assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
 
 
-def test_a_part_left_by_a_crash_does_not_stand_in_the_way(tmp_path: Path) -> None:
-    (tmp_path / ".table.csv.part").write_bytes(b"half")
+def test_a_part_left_by_a_crash_is_taken_away_and_one_at_work_is_not(tmp_path: Path) -> None:
+    left, at_work = tmp_path / ".table.csv.1-2.part", tmp_path / ".table.csv.3-4.part"
+    for part in (left, at_work):
+        part.write_bytes(b"half")
+    os.utime(left, (0, 0))
     storage.write_whole(tmp_path / "table.csv", b"whole")
     assert (tmp_path / "table.csv").read_bytes() == b"whole"
+    assert (left.exists(), at_work.exists()) == (False, True)
+
+
+def test_who_writes_one_file_at_once_leaves_it_whole(tmp_path: Path) -> None:
+    path, texts = tmp_path / "columns.md", [letter * 100_000 for letter in (b"a", b"b", b"c", b"d")]
+
+    def write(text: bytes) -> None:
+        for _ in range(50):
+            storage.write_whole(path, text)
+            assert path.read_bytes() in texts
+
+    with ThreadPoolExecutor(4) as pool:
+        for done in [pool.submit(write, text) for text in texts]:
+            done.result()
+    assert [file.name for file in tmp_path.iterdir()] == ["columns.md"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")

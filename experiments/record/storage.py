@@ -10,9 +10,11 @@ import errno
 import os
 import stat
 import sys
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 
 OWNER_FILE = 0o600
@@ -233,11 +235,13 @@ def check_file(path: Path) -> None:
 def write_whole(path: Path, data: bytes) -> None:
     """Put a whole file in its place at once: readers see the old one or the new one, never a part.
 
-    A journal is the only full record of a run: nothing takes its place.
+    A journal is the only full record of a run: nothing takes its place. Whoever writes the same file at the same time,
+    as consoles that share a folder do, writes a part of their own; the last one stands there in the end.
     """
-    part = path.with_name(f".{path.name}.part")
+    part = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.part")
     with errors_name(path):
         check_file(path)
+        _take_away_parts(path)
         if path.name.endswith(JOURNAL_ENDING) and path.exists():
             raise FileExistsError(errno.EEXIST, "is the journal of a run, which nothing replaces", str(path))
         part.unlink(missing_ok=True)
@@ -254,6 +258,18 @@ def write_whole(path: Path, data: bytes) -> None:
             error.filename, error.filename2 = str(path), None  # nobody knows the other name
             raise
         sync_folder(path.parent)
+
+
+_LEFT_S = 3600.0
+"""A part that nobody has written to for so long was left by a program that was killed."""
+
+
+def _take_away_parts(path: Path) -> None:
+    """Take away what a program that was killed left of a file."""
+    with suppress(OSError):
+        for part in path.parent.glob(f".{escape(path.name)}.*.part"):
+            if time.time() - part.stat().st_mtime > _LEFT_S:
+                part.unlink()
 
 
 def set_aside_file(path: Path) -> Path:
