@@ -22,6 +22,7 @@ from analysis.logs.cell_rules import as_moment
 from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
 from device.words import how_many
+from experiments.design.units import long_name
 from experiments.record import tables
 from experiments.record.design_columns import HANDS, columns
 from experiments.record.shots_table import SHOTS
@@ -164,7 +165,7 @@ def described(column: Column, name: str) -> ColumnDescription:
     """A column as BIDS describes it, from the data dictionary. `name` is what it is called in the data set."""
     text = re.sub(r"\bempty\b", "n/a", column.description).replace("`", "'")
     found: ColumnDescription = {
-        "LongName": long_name(name, column.unit),
+        "LongName": long_name(name),
         "Description": f"{text}; {_CLEANED}" if _is_free_text(column) else text,
         "Format": _FORMATS[column.type],
     }
@@ -173,15 +174,6 @@ def described(column: Column, name: str) -> ColumnDescription:
     if column.levels:
         found["Levels"] = {tables.guard(level): _LEVELS.get(level, level) for level in column.levels}
     return found | _MORE.get(name, {})
-
-
-def long_name(name: str, unit: str = "") -> str:
-    """A column's name in words: the unit at its end is told elsewhere.
-
-    >>> long_name("exposure_s"), long_name("response_time_valid"), long_name("voltage_V_1", "V")
-    ('Exposure', 'Response time valid', 'Voltage 1')
-    """
-    return re.sub(rf"_{re.escape(unit or 's')}(?=(_[0-9]+)?$)", "", name).replace("_", " ").capitalize()
 
 
 def readme(people: int, synthetic: int, *, free_text: bool) -> str:

@@ -11,7 +11,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.archive.bids import NOT_AVAILABLE, PARTICIPANT_COLUMNS, json_bytes, long_name
+from analysis.archive.bids import NOT_AVAILABLE, PARTICIPANT_COLUMNS, json_bytes
+from experiments.design.units import long_name
 from experiments.record.tables import MISSING, Column, guard
 
 DESCRIPTOR = "datapackage.json"
@@ -39,7 +40,7 @@ def schema(columns: Iterable[Column], keys: Sequence[str] = ()) -> bytes:
 def _field(column: Column) -> dict[str, object]:
     field: dict[str, object] = {
         "name": column.name,
-        "title": long_name(column.name, column.unit),
+        "title": long_name(column.name),
         "type": _TYPES[column.type],
         "description": column.description,
     }

@@ -36,6 +36,7 @@ from experiments.design.language import (
 from experiments.design.plan import Condition, in_interval
 from experiments.design.procedure_problems import procedure_problems
 from experiments.design.procedures.config import AdaptiveConfig, ConstantConfig, PairingConfig, ProcedureConfig
+from experiments.design.units import parted
 
 
 def _is_english(code: str) -> bool:
@@ -262,22 +263,19 @@ def _factor_problems(design: DesignConfig) -> Iterator[str]:
 
 
 def _level_problems(name: str, factor: FactorConfig) -> Iterator[str]:
-    shown, unit = [shown_level(level) for level in factor.all_levels], name.rsplit("_", 1)[-1]
+    shown, unit = [shown_level(level) for level in factor.all_levels], parted(name).unit
     words = isinstance(factor.all_levels[0], str)
     if name == DIRECTION_FACTOR and not set(shown) <= set(get_args(Direction)):
         yield f"levels {', '.join(shown)}: directions are {', '.join(get_args(Direction))}"
     if name in {METHOD_FACTOR, INSTRUCTION_FACTOR} and not words:
         yield "levels are numbers; name them in words"
-    if unit in _UNITS and words:
+    if unit and words:
         yield f"levels are words, but the name ends with the unit {unit}; give numbers"
     missing = [level for level in shown if level not in factor.texts]
     if name == INSTRUCTION_FACTOR and missing:
         yield f"texts has no words for {', '.join(missing)}; give what is read out"
     if name != INSTRUCTION_FACTOR and factor.texts:
         yield "texts are of the factor `instruction`; use labels here"
-
-
-_UNITS = frozenset(["V", "s", "N", "A", "ohm", "H", "kg", "m", "Hz", "N_m"])
 
 
 def _nesting_problems(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:

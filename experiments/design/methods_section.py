@@ -18,6 +18,7 @@ from experiments.design.planned import PlannedRun
 from experiments.design.procedures.config import AdaptiveConfig, PairingConfig, least_of_track
 from experiments.design.procedures.in_words import end_words, pairing_words, rule_words
 from experiments.design.stimuli import by_hand
+from experiments.design.units import parted, written_unit
 
 
 def methods_section(design: DesignConfig, runs: Sequence[PlannedRun]) -> tuple[str, ...]:
@@ -74,19 +75,14 @@ def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
     return text[0].upper() + text[1:]
 
 
-_UNITS = {"V": "V", "s": "s", "N": "N", "A": "A", "ohm": "Ω", "m": "m", "kg": "kg", "Hz": "Hz"}
-
-
 def factor_words(name: str) -> str:
     """A factor's name as words, with its unit.
 
     >>> factor_words("voltage_V"), factor_words("posture"), factor_words("voltage_V_1")
     ('voltage in V', 'posture', 'voltage in V 1')
     """
-    stem, _, unit = name.rpartition("_")
-    if stem and unit.isdigit():  # of an interval
-        return f"{factor_words(stem)} {unit}"
-    return f"{stem.replace('_', ' ')} in {_UNITS[unit]}" if stem and unit in _UNITS else name.replace("_", " ")
+    words, unit, interval = parted(name)
+    return " ".join([words, *([f"in {written_unit(unit)}"] if unit else []), *([interval] if interval else [])])
 
 
 def level_words(name: str, level: Level) -> str:
@@ -97,8 +93,8 @@ def level_words(name: str, level: Level) -> str:
     """
     if isinstance(level, str):
         return level
-    unit = next((part for part in reversed(name.split("_")[1:]) if part in _UNITS), "")
-    return f"{shown_level(level)} {_UNITS[unit]}" if unit else f"{factor_words(name)} {shown_level(level)}"
+    unit = parted(name).unit
+    return f"{shown_level(level)} {written_unit(unit)}" if unit else f"{factor_words(name)} {shown_level(level)}"
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -31,6 +31,7 @@ from experiments.design.language import (
 )
 from experiments.design.plan import CHOSEN, Condition, Trial
 from experiments.design.planning import groups
+from experiments.design.units import parted
 
 _GUN_NUMBERS = tuple(
     field.name for field in fields(GunParameters) if isinstance(field.default, float) or field.default is None
@@ -200,7 +201,7 @@ def _numbers(design: DesignConfig, held: Mapping[str, Level]) -> dict[str, tuple
 
 def _has_unit_of_the_gun(name: str) -> bool:
     """Whether a factor's name ends as the gun's numbers of a drive do: then it is most likely a misspelling of one."""
-    return name.rsplit("_", 1)[-1] in {number.rsplit("_", 1)[-1] for number in DRIVEN}
+    return parted(name).unit in {parted(number).unit for number in DRIVEN}
 
 
 def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], method: str) -> Method:

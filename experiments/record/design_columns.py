@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from experiments.design.config import DesignConfig
 from experiments.design.language import DIRECTION_FACTOR, METHOD_FACTOR, FactorConfig, QuestionConfig, shown_level
 from experiments.design.plan import in_interval
+from experiments.design.units import parted
 from experiments.record import tables
 from experiments.record.tables import Column
 from experiments.tasks.questions import correct_columns
@@ -61,9 +62,13 @@ _MEANINGS = {
 
 
 def _factor(name: str, column: str, factor: FactorConfig, description: str) -> Column:
-    """A column of a factor's levels; the unit ends the factor's name, not always the column's."""
+    """A column of a factor's levels; the unit ends the factor's name, not always the column's.
+
+    A unit that nobody knows here, as in angle_deg, is one all the same.
+    """
     if isinstance(factor.all_levels[0], float):
-        return tables.number_column(column, name.rsplit("_", 1)[-1] if "_" in name else "", description)
+        own = name.rsplit("_", 1)[-1] if "_" in name else ""
+        return tables.number_column(column, parted(name).unit.replace("_", "/") or own, description)
     return tables.level_column(column, tuple(map(shown_level, factor.all_levels)), description)
 
 
