@@ -353,4 +353,5 @@ def check_participants_keys(screen: AtConsole, cell: Cell, *keys: str) -> None:
     screen.until(lambda look: not look.active)
     screen.keys.press("F12")
     screen.until(lambda look: look.state == "halted" and look.says("The gun itself says that it is disarmed."))
+    wait_for(lambda: len(remarks(cell.journal)) > before)  # the gun is stopped before that is on the disk
     assert remarks(cell.journal)[before:] == [{"by": "participant", "kind": "halted"}]
