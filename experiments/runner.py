@@ -190,7 +190,7 @@ class _Runner:
                 raise Unforeseen(other)
 
     def _answered(self, step: steps.Ask, answer: events.Answer | events.ParticipantKey) -> steps.Answered:
-        """The answer with its time, which is the participant's own only by their own key, and without a pause.
+        """The answer with its time, which is the participant's own only by their own key, without pause or standstill.
 
         Of what was felt a while ago no time says anything, nor of a train, which lasts until the participant goes on.
         """
@@ -201,7 +201,7 @@ class _Runner:
         time_s = drawn_s if drawn_s is not None else key_time_s
         if time_s is None:
             raise TypeError("an answer without a time")
-        own = drawn_s is not None or isinstance(answer, events.ParticipantKey)
+        own = answer.timed if isinstance(answer, events.ParticipantKey) else drawn_s is not None
         paused = self._live.moment.paused_between(self._onset_s, self._onset_s + time_s)
         return steps.Answered(
             value=answer.response,

@@ -311,6 +311,17 @@ def test_a_pause_right_after_an_answer_does_not_spoil_its_time(tmp_path: Path) -
     assert rows[0]["response_time_valid"] == "1"
 
 
+def test_a_key_that_was_stamped_too_late_answers_with_a_time_that_does_not_count(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        sitting.clock.skip(0.5)
+        assert sitting.live.offer(own_key(sitting, timed=False))
+        _, rows = to_the_end(sitting)
+    row = rows[0]
+    assert (row["response"], row["response_source"], row["response_time_valid"]) == ("backward", "participant", "0")
+    assert [row["flags"] for row in rows] == ["key-time-lost"] + [""] * (len(rows) - 1)
+
+
 @pytest.mark.parametrize("said", ["forward", "backward"])
 def test_a_corrected_answer_of_the_own_hand_keeps_its_time_and_is_not_valid(said: Any, tmp_path: Path) -> None:
     times = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.screens.participant.link import ParticipantError
+from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look
 from tests.at_participant import (
     BUTTON_Y,
@@ -186,6 +186,23 @@ def maps(link, monkeypatch):
     kept, map_clocks = [], link.map_clocks
     monkeypatch.setattr(link, "map_clocks", lambda: kept.append(map_clocks()) or kept[-1])
     return kept
+
+
+def test_a_key_that_goes_down_while_the_program_stands_still_says_for_how_long(
+    display, hands, console, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with ParticipantLink.start(Look()) as link:  # the program itself, and nothing in its stead that can be stopped
+        link.wait_ready(PATIENCE_S)
+        show(link, "Please wait")
+        question = replace(WHICH, onset_s=time.monotonic())
+        answer = hands.changing(lambda: console.submit(link.ask_choice, question))
+        os.kill(link.pid, signal.SIGSTOP)
+        hands.key("f")
+        time.sleep(0.5)
+        os.kill(link.pid, signal.SIGCONT)
+        assert answer.result(PATIENCE_S).stood_still_s > 0.4
 
 
 def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, maps):

@@ -83,10 +83,7 @@ def _questions(design: DesignConfig) -> Iterator[Column]:
                 f"{name}_time_s", "time from the onset of the last stimulus to the answer; empty if there is none"
             )
             yield tables.level_column(f"{name}_source", HANDS, "whose hand gave the answer")
-            yield tables.flag_column(
-                f"{name}_time_valid",
-                "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand",
-            )
+            yield tables.flag_column(f"{name}_time_valid", tables.TIME_VALID)
         elif question.kind != "text":
             yield tables.level_column(f"{name}_by", HANDS, "whose hand entered it")
 

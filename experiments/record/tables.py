@@ -96,7 +96,12 @@ FLAGS = text_column(
     "`repeated`, `corrected`, `anticipation` (the participant's key within 0.1 s of the onset), `clock-set-back` (the "
     "computer's date and time went back since the trial before), `at-edge` (a procedure chose the end of its levels, "
     "and may have gone on), `track-over` (not presented, or not again: the track had ended), `not-delivered` (a sensor "
-    "says so of the last presentation), and the experimenter's own",
+    "says so of the last presentation), `key-time-lost` (the program of the participant's screen stood still for more "
+    "than 0.1 s as the key went down), and the experimenter's own",
+)
+TIME_VALID = (
+    "1 if the time is the participant's own; 0 if corrected, by the experimenter's hand, over a pause or flagged "
+    "`key-time-lost`"
 )
 NOTE = text_column("note", "the experimenter's note")
 ONSET = text_column(
@@ -149,9 +154,7 @@ TRIALS: tuple[Column, ...] = (
     flag_column("correct", "1 if the response is the direction, 0 if not; empty without a response"),
     seconds_column("response_time_s", "time from the onset of the pulse to the answer; empty if there is none"),
     level_column("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
-    flag_column(
-        "response_time_valid", "1 if the time is the participant's own; 0 if corrected or by the experimenter's hand"
-    ),
+    flag_column("response_time_valid", TIME_VALID),
     *PRESENTATION,
     level_column(
         "instruction",

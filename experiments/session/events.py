@@ -185,12 +185,14 @@ class EmergencyStop(Event):
 class ParticipantKey(Event):
     """A key of the participant's own; `step` is the number of the step that asked, `at_s` when it went down.
 
-    `typed`: a line or a page was open on the console, which may have been what the key was for.
+    `typed`: a line or a page was open on the console, which may have been what the key was for. `timed`: `at_s` is
+    when it went down, and not when the program that stamps keys woke up.
     """
 
     response: str
     at_s: float
     step: int
+    timed: bool = True
     by: OwnHand = "participant"
     typed: bool = False
 

@@ -202,6 +202,8 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
     match event:
         case events.Flag():
             return remarks.Flagged(trial=event.trial or trial, flag=event.flag)
+        case events.ParticipantKey(timed=False):
+            return remarks.Flagged(trial=trial, flag=remarks.KEY_TIME_LOST)
         case events.Note():
             return remarks.Noted(trial=event.trial or trial, text=event.text)
         case events.Correct() if before.correcting is not None:

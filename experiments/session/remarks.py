@@ -24,6 +24,10 @@ class EntryCorrected:
     kind: Literal["corrected"] = "corrected"
 
 
+KEY_TIME_LOST = "key-time-lost"
+"""The flag of a trial whose key counts and whose response time does not: what stamps keys had stood still."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flagged:
     """A trial is marked, with a word such as `noise` or `late`."""

@@ -224,21 +224,33 @@ class ParticipantSide:
             onset_s=position.since_s if paused else from_s,  # a key in a pause is no answer
             once_seen=paused or not position.asked_at_onset,  # nor one while their screen still says something else
         )
-        while wanted() and not self._keyed(question, position, wanted):
+        while wanted() and not self._keyed(step, question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
 
     def _numbered(self, step: Ask) -> str:
         return self._messages.numbered.format(number=step.trial.trial, question=step.text)
 
-    def _keyed(self, question: messages.AskChoice, position: Position, wanted: Wanted) -> bool:
+    def _keyed(self, step: Ask, question: messages.AskChoice, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""
         given = self._link.ask_choice(question, wanted=wanted)
         key = events.ParticipantKey(
-            response=given.response, at_s=given.pressed_s, step=position.number, by=self._hand, typed=self.covered
+            response=given.response,
+            at_s=given.pressed_s,
+            step=position.number,
+            by=self._hand,
+            typed=self.covered,
+            timed=step.later or not given.stood_still_s,
         )
         verdict = self._live.offer(key) if self._live is not None else None
         if verdict is not None and verdict.text:
             self._tell(Trouble(text=phrase("The participant’s key was not taken. {text}", text=verdict.text)))
+        elif verdict and not key.timed:
+            lost = phrase(
+                "The participant’s screen stood still for {seconds} s: the answer counts, its time does not. Close "
+                "what else runs on this computer.",
+                seconds=f"{given.stood_still_s:.1f}",
+            )
+            self._tell(Trouble(text=lost))
         return bool(verdict)
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:

@@ -9,6 +9,7 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import BinaryIO
 
 from pydantic import ValidationError
@@ -18,6 +19,7 @@ from experiments.screens.participant.messages import line
 from experiments.screens.participant.noise import MaskingNoise
 from experiments.screens.participant.pages import ChoicePage, DescriptionPage, Drafts, MessagePage, RatingPage
 from experiments.screens.participant.stage import KeyPresses, Stage, load_toolkit
+from experiments.screens.participant.standstill import Standstills
 
 
 class Wire:
@@ -102,6 +104,7 @@ class App:
     def __init__(self, stage: Stage, wire: Wire) -> None:
         self._stage, self._wire = stage, wire
         self._keys = KeyPresses(stage.toolkit)
+        self._standstills = Standstills(stage.toolkit.now)
         self._noise = MaskingNoise()
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
@@ -116,6 +119,7 @@ class App:
         self._stage.step()
         size = f"{self._stage.width_px}x{self._stage.height_px}"
         self._wire.say(messages.Ready(psychopy=self._stage.toolkit.version, window=size, refresh_Hz=refresh_Hz))
+        self._standstills.watch()
         self._wire.listen()
 
     def serve(self) -> None:
@@ -167,5 +171,7 @@ class App:
         """Say what the page came to, if it did, and thank for it. After a page to type on another is likely to come."""
         page = self._stage.page
         if (given := page.outcome()) is not None:
+            if isinstance(given, messages.ChoiceGiven):
+                given = replace(given, stood_still_s=self._standstills.around_s(given.pressed_s))
             self._wire.say(given)
             self._stage.put(MessagePage(self._stage, self._stage.look.messages.between), keep_keys=page.typed)

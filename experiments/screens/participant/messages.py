@@ -159,10 +159,11 @@ class DescriptionGiven:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChoiceGiven:
-    """Which answer, and when its key went down."""
+    """Which answer, and when its key went down; `stood_still_s`: by how much that may be too late, as nobody looked."""
 
     response: str
     pressed_s: _Finite
+    stood_still_s: _Finite = 0.0
     ask: int = 0
     kind: Literal["choice-given"] = "choice-given"
 

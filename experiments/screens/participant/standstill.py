@@ -1,0 +1,48 @@
+"""When the whole program stood still: swapped out, stopped or starved. Keys pressed meanwhile are stamped too late."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+LONGEST_S = 0.1
+"""How long the program may stand still: less is little beside how people differ from trial to trial."""
+
+_LOOK_S = 0.01
+_KEPT = 64
+
+
+class Standstills:
+    """A thread that does nothing but look at the clock, and what it missed. `now` is the clock that stamps keys."""
+
+    def __init__(self, now: Callable[[], float], *, look_s: float = _LOOK_S) -> None:
+        self._now, self._look_s = now, look_s
+        self._seen_s = now()
+        self._missed: deque[tuple[float, float]] = deque(maxlen=_KEPT)
+
+    def watch(self) -> None:
+        """Begin to look."""
+        threading.Thread(target=self._watch, name="standstills", daemon=True).start()
+
+    def look(self) -> None:
+        """Look once: more than `LONGEST_S` since the last time is a standstill."""
+        now_s = self._now()
+        if now_s - self._seen_s > LONGEST_S:
+            self._missed.append((self._seen_s, now_s))
+        self._seen_s = now_s
+
+    def around_s(self, stamped_s: float) -> float:
+        """How long the program stood still when a key was stamped, or just before, in seconds: 0 if it did not.
+
+        A key may be stamped before the thread has looked again: what is missing until now counts too.
+        """
+        missed = [*self._missed, (self._seen_s, self._now())]
+        near = (end - start for start, end in missed if start <= stamped_s <= end + LONGEST_S)
+        return max((stood_s for stood_s in near if stood_s > LONGEST_S), default=0.0)
+
+    def _watch(self) -> None:
+        while True:
+            time.sleep(self._look_s)
+            self.look()

@@ -1,0 +1,50 @@
+"""When the participant's program stood still, by a clock that the test moves."""
+
+from __future__ import annotations
+
+import pytest
+
+from experiments.screens.participant.standstill import LONGEST_S, Standstills
+
+
+class Clock:
+    """A clock that moves when it is told to."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def now(self) -> float:
+        return self.now_s
+
+
+def looked_at(*moments_s: float) -> tuple[Standstills, Clock]:
+    """A watch that looked at some moments, after 0 s."""
+    clock = Clock()
+    found = Standstills(clock.now)
+    for clock.now_s in moments_s:
+        found.look()
+    return found, clock
+
+
+@pytest.mark.parametrize("stamped_s", [0.02, 0.5, 1.02, 1.02 + LONGEST_S])
+def test_a_key_in_a_standstill_or_right_after_it_tells_how_long_it_was(stamped_s: float) -> None:
+    found, clock = looked_at(0.01, 1.02, 1.03, 1.1)
+    clock.now_s = 1.15
+    assert found.around_s(stamped_s) == pytest.approx(1.01)
+
+
+@pytest.mark.parametrize("stamped_s", [0.005, 1.3])
+def test_a_key_long_before_or_after_a_standstill_is_good(stamped_s: float) -> None:
+    found, _ = looked_at(0.01, 1.02, 1.1, 1.15, 1.2, 1.25, 1.3)
+    assert found.around_s(stamped_s) == 0.0
+
+
+def test_a_standstill_that_nobody_has_seen_the_end_of_counts() -> None:
+    found, clock = looked_at(0.01)
+    clock.now_s = 0.8
+    assert found.around_s(0.79) == pytest.approx(0.79)
+
+
+def test_who_looks_often_enough_missed_nothing() -> None:
+    found, _ = looked_at(*(0.05 * count for count in range(1, 20)))
+    assert {found.around_s(0.1 * count) for count in range(10)} == {0.0}
