@@ -59,7 +59,6 @@ _GRIDS = {
     "width": {"points": 3, "minimum": 2.0, "maximum": 12.0},
     "lapse": {"points": 2, "minimum": 0.0, "maximum": 0.04},
 }
-_STARTS = {"starts": [16.0, 10.0]}
 _TRACKS = {
     "posterior": {"tracks": 2, "trials": 8, **_GRIDS},
     "posterior-ends": {"tracks": 2, "trials": 10, "credible_width": 5.0, "least_trials": 3, **_GRIDS},

@@ -34,7 +34,7 @@ from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.instructions import instruction
 from experiments.screens.console.keys import Name, Presses
-from experiments.screens.console.view import About, Ended, GunSeen, Seen
+from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.session import events
 from experiments.session.events import Press
 from experiments.session.remarks import EntryCorrected, Remark
@@ -653,11 +653,6 @@ def sat(setup: Setup[DesignConfig], results: Path, *, resumed: bool = False, gat
     finally:
         if not sitting.ended.is_set():
             sitting.stop()
-
-
-def ended(sitting: Sitting) -> Ended:
-    """How the window is told that a run has ended."""
-    return Ended(reason=None if sitting.error is None else str(sitting.error))
 
 
 def kept(results: Path, experiment: str) -> tuple[Place, Contents, list[dict[str, str]]]:

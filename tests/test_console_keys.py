@@ -47,7 +47,7 @@ def at(state: State, entry: Asking = CORRECTED[0]) -> Position:
 POSITIONS = [*(at(state) for state in State), *(at(S.CORRECTING, entry) for entry in CORRECTED[1:])]
 NO_FIELD = [position for position in POSITIONS if field_at(position) is None]
 FIELD = [position for position in POSITIONS if field_at(position) is not None]
-LINE, IN_FIELD, NOTHING = Typing(line=True), Typing(field=True), Typing()
+NOTHING = Typing()
 
 
 def command(key: str, position: Position, *, ctrl: bool = False, line: bool = False) -> Name | None:

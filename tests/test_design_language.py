@@ -15,7 +15,6 @@ from tests.designs import QUESTION, design
 
 ONE = {"method": {"levels": ["a"]}}
 VOLTS = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [12.0, 20.0]}}
-NESTED = ONE | {"voltage_V": {"levels": {"a": [1.0]}, "within": "method"}}
 INTERVALS = {"kind": "two-interval", "compare": "voltage_V", "standard": 16.0}
 WAYS = {"levels": ["forward", "backward"]}
 

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.screens.console.keys import KEY_COMMANDS
 from experiments.session import events
 from experiments.session.events import ACTS, KINDS, Event
 from experiments.session.states import (
@@ -110,7 +109,6 @@ def test_the_committed_page_says_what_the_table_says() -> None:
 
 REFUSALS = [(kind, state, no.because) for kind in KINDS for state, no in TABLE[kind].items() if isinstance(no, No)]
 SENTENCES = sorted({because for _, _, because in REFUSALS})
-KEYS = {command.key for command in KEY_COMMANDS}
 
 
 def keys_in(sentence: str) -> set[str]:

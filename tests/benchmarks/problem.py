@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from device.methods import FRICTION_I_N, FRICTION_II_N
 from device.parameters import DriveOff, GunParameters
@@ -91,8 +91,3 @@ def force_on_hand(gun: GunParameters, x: float, i: float) -> float:
     """F = m d2x/dt2 of equation (1) inside the coil, on the way out."""
     motor = gun.motor_constant_N_A * (1.0 - x / gun.coil_reach_m) * i
     return motor - gun.stiffness_N_m * (x + gun.preload_length_m) - gun.friction_N
-
-
-def without_friction(gun: GunParameters) -> GunParameters:
-    """The gun's numbers but for its friction: what solvers that take friction as an argument are built for."""
-    return replace(gun, friction_N=0.0)
