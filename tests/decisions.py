@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 from numpy.typing import ArrayLike
 
+from analysis.times.first_passage import with_slopes
 from analysis.times.likelihood import Trials, trials_of
 from experiments.design.streams import Stream, generator
 from experiments.synthetic.decision import Bools, Floats, crossing_times, decide, upper_probabilities
@@ -102,6 +103,14 @@ def reference(t: float, upper: bool, v: float, a: float, w: float) -> mpmath.mpf
         tau = t_ / a_**2
         total = mpmath.fsum((w_ + 2 * k) * mpmath.exp(-((w_ + 2 * k) ** 2) / (2 * tau)) for k in range(-200, 200))
         return mpmath.log(total / mpmath.sqrt(2 * mpmath.pi * tau**3) / a_**2) - v_ * a_ * w_ - v_**2 * t_ / 2
+
+
+def log_density(time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary: ArrayLike, start: ArrayLike) -> Floats:
+    """The same of many, as likelihoods have it: from `with_slopes`."""
+    t, up, v, a, w = np.broadcast_arrays(time_s, upper, drift, boundary, start)
+    v, near = np.where(up, -v, v), np.where(up, 1.0 - w, w)
+    found = with_slopes((t / a**2).ravel(), near.ravel()).value.reshape(t.shape)
+    return np.asarray(found - 2.0 * np.log(a) - v * a * near - v * v * t / 2.0)
 
 
 def law(drift: float, boundary: float, start: float, t0: float = 0.0) -> Diffusion:

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.times import first_passage, trade
-from analysis.times.first_passage import distribution, log_density, moments, with_slopes
+from analysis.times import trade
+from analysis.times.first_passage import MEET_AT, distribution, moments, with_slopes
 from analysis.times.own_trials import own_times
 from analysis.times.trade import ez, ez_from_summary
 from experiments.design.streams import generator
-from tests.decisions import decide_all, reference
+from tests.decisions import decide_all, log_density, reference
 
 CASES = [(1.0, 2.0, 0.5), (-3.0, 1.2, 0.2), (0.0, 1.0, 0.9), (8.0, 3.0, 0.1), (0.3, 0.6, 0.03)]
 TIMES = (1e-3, 0.05, 0.2999, 0.3001, 1.0, 4.0, 40.0)
@@ -37,15 +37,14 @@ def test_the_log_density_of_the_far_tails_does_not_underflow() -> None:
     early, late = log_density(1e-6, True, 1.0, 1.0, 0.5), log_density(1e6, True, 1.0, 1.0, 0.5)
     assert early == pytest.approx(-125_000 - 1.5 * math.log(1e-6) + math.log(0.5 / math.sqrt(2 * math.pi)) + 0.5)
     assert late == pytest.approx(math.log(math.pi) + 0.5 - (1 + math.pi**2) * 5e5, rel=1e-14)
-    assert log_density(0.0, True, 1.0, 1.0, 0.5) == -math.inf
 
 
 def test_the_two_series_agree_where_they_meet() -> None:
     near = np.linspace(0.001, 0.999, 41)
-    tau = np.full(41, first_passage.MEET_AT)
-    images = first_passage.log_images(tau, near, 1 - near)
-    waves = first_passage.log_waves(tau, near, 1 - near)
-    assert np.abs(images - waves).max() < 1e-12
+    images, waves = (with_slopes(np.full(41, tau), near) for tau in (MEET_AT, math.nextafter(MEET_AT, 1.0)))
+    assert np.abs(images.value - waves.value).max() < 1e-12
+    assert images.by_time == pytest.approx(waves.by_time, rel=1e-9)
+    assert images.by_start == pytest.approx(waves.by_start, rel=1e-9)
 
 
 def area(density: Callable[[np.ndarray], np.ndarray], cuts: list[float]) -> float:
@@ -118,9 +117,8 @@ def test_slopes_are_those_of_the_log_density() -> None:
 
 @pytest.mark.parametrize(("a", "w"), [(0.0, 0.5), (math.nan, 0.5), (1.0, 0.0), (1.0, math.nan)])
 def test_an_impossible_boundary_or_start_is_refused(a: float, w: float) -> None:
-    for function in (log_density, distribution):
-        with pytest.raises(ValueError, match=r"boundary|start"):
-            function(0.5, True, 1.0, a, w)
+    with pytest.raises(ValueError, match=r"boundary|start"):
+        distribution(0.5, True, 1.0, a, w)
 
 
 # EZ-diffusion
@@ -283,9 +281,8 @@ def test_scores_refuse_what_is_no_rate_or_time(score: object) -> None:
             score(rates, times)
 
 
-def test_no_time_has_no_density_and_neither_end_of_time_has_any() -> None:
+def test_nothing_is_decided_before_the_onset_and_all_is_in_the_end() -> None:
     times = [math.nan, -1.0, 0.0, math.inf]
-    assert str(log_density(times, True, 1.0, 1.0, 0.5).tolist()) == "[nan, -inf, -inf, -inf]"  # type: ignore[union-attr]
     after = distribution(times, True, 1.0, 1.0, 0.5)
     assert str(after[:3].tolist()) == "[nan, 0.0, 0.0]"  # type: ignore[index]
     assert after[3] == pytest.approx(moments(1.0, 1.0).upper, rel=1e-14)  # type: ignore[index]

@@ -7,12 +7,23 @@ import math
 import numpy as np
 import pytest
 
-from analysis.times.first_passage import log_density
 from analysis.times.fit import fit, profile, starts
 from analysis.times.likelihood import coordinates, log_likelihood, model_of, natural, trials_of
 from analysis.times.people import fit_people
 from experiments.design.streams import generator
-from tests.decisions import BOUNDARIES, DRIFTS, INSTRUCTIONS, METHODS, RANGE_S, START, T0_S, TRUTH, decide_all, made
+from tests.decisions import (
+    BOUNDARIES,
+    DRIFTS,
+    INSTRUCTIONS,
+    METHODS,
+    RANGE_S,
+    START,
+    T0_S,
+    TRUTH,
+    decide_all,
+    log_density,
+    made,
+)
 
 pytestmark = pytest.mark.slow
 

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from scipy.stats import kstwo
 
-from analysis.times.first_passage import distribution, log_density, moments
+from analysis.times.first_passage import distribution, moments
 from analysis.times.fit import DiffusionFit, Estimate, fit
 from analysis.times.people import MeanEstimate, PeopleFit, fit_people
 from experiments.design.streams import generator
 from experiments.synthetic.decision import upper_probabilities
 from experiments.synthetic.diffusion import Diffusion
 from tests.conftest import Soak
-from tests.decisions import EXTREMES, RANGE_S, TRUTH, decide_all, law, made, reference, scalar
+from tests.decisions import EXTREMES, RANGE_S, TRUTH, decide_all, law, log_density, made, reference, scalar
 
 pytestmark = pytest.mark.soak
 

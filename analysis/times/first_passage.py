@@ -6,8 +6,9 @@
 f is the density without drift from w in (0, 1), by one of two series (Navarro & Fuss 2009, J. Math. Psychol. 53, 222;
 Feller 1968): images for short times, waves for long ones. They choose the number of terms from a bound on the
 absolute error. Here the number is fixed, and where the series meet, `MEET_AT`, is chosen such that `IMAGES` and
-`WAVES` terms leave a *relative* error below 1e-18 for w from 1e-6 to 1 - 1e-6, so rounding rules, in the tails as well.
-Each series is divided by its leading exponential, so the logarithm never meets an underflow.
+`WAVES` terms leave a *relative* error below 1e-18 for w from 1e-6 to 1 - 1e-6, so rounding rules, in the tails as
+well: 1e-14, and 1e-12 at these ends. Each series is divided by its leading exponential, so the logarithm never meets
+an underflow.
 
 With x coth x and x^2 / sinh^2 x of x = a v and x = z v (the logarithm of the transform of the upper exit's time is
 log sinh(z g) - log sinh(a g) + const, g = sqrt(v^2 + 2 lambda), of which these are the first two derivatives):
@@ -38,8 +39,8 @@ from analysis.stats.arrays import FloatArray, Values, float_or_array
 
 MEET_AT = 0.3
 """Scaled time t / a^2 where the series meet: at most 7 exp(-60) and 36 exp(-51) of the sums are left out there."""
-IMAGES = 3
-"""Pairs of images, (m - 1 + w) and -(m + 1 - w) for m = 1, 3, 5."""
+IMAGES = (0, -1, 1, -2, 2, -3)
+"""The k of the images at w + 2 k, in pairs that cancel least."""
 WAVES = 5
 
 _LOG_2PI = math.log(2.0 * math.pi)
@@ -54,31 +55,6 @@ class LogDensity:
     by_start: FloatArray
 
 
-def log_density(time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary: ArrayLike, start: ArrayLike) -> Values:
-    """Log p(t, answer) of the decision time (without t0) and the answer; -inf at t <= 0 and t = inf, NaN at NaN.
-
-    All arguments broadcast. `ValueError`: a boundary not above 0 or a start not strictly between 0 and 1.
-
-    >>> round(float(log_density(0.5, True, 1.0, 1.0, 0.5)), 6)
-    -1.072671
-    """
-    t, up, v, a, w = _together(time_s, upper, drift, boundary, start)
-    v, near, far = np.where(up, -v, v), np.where(up, 1.0 - w, w), np.where(up, w, 1.0 - w)
-    inside = np.where((t > 0.0) & (t < math.inf), t, 1.0)
-    value = unit_log_density(inside / a**2, near, far) - 2.0 * np.log(a) - v * a * near - v * v * inside / 2.0
-    return float_or_array(np.select([inside == t, np.isnan(t)], [value, math.nan], default=-math.inf))
-
-
-def _together(
-    time_s: ArrayLike, upper: ArrayLike, drift: ArrayLike, boundary: ArrayLike, start: ArrayLike
-) -> tuple[FloatArray, NDArray[np.bool_], FloatArray, FloatArray, FloatArray]:
-    """The arguments as arrays of one shape. `ValueError`: as `check_bounds`."""
-    t, v, a, w = (np.asarray(values, dtype=np.float64) for values in (time_s, drift, boundary, start))
-    t, up, v, a, w = np.broadcast_arrays(t, np.asarray(upper, dtype=np.bool_), v, a, w)
-    check_bounds(a, w)
-    return t, up, v, a, w
-
-
 def check_bounds(boundary: FloatArray, start: FloatArray) -> None:
     """`ValueError` unless every boundary is above 0 and every start strictly between 0 and 1."""
     if not (boundary > 0.0).all():
@@ -87,38 +63,6 @@ def check_bounds(boundary: FloatArray, start: FloatArray) -> None:
         raise ValueError(
             f"start must lie strictly between 0 and 1, not {start[~((start > 0) & (start < 1))].ravel()[0]}"
         )
-
-
-def unit_log_density(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
-    """Log f(tau, near), with far = 1 - near given apart so that neither end loses digits."""
-    value = np.empty(np.shape(tau))
-    short = tau <= MEET_AT
-    value[short] = log_images(tau[short], near[short], far[short])
-    value[~short] = log_waves(tau[~short], near[~short], far[~short])
-    return value
-
-
-def log_images(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
-    """The images paired round each odd m at distance `far`: (m - far) e^.. - (m + far) e^.., without cancellation."""
-    total = np.zeros_like(tau)
-    for m in range(1, 2 * IMAGES, 2):
-        ahead = m - 1.0 + near
-        fall = -2.0 * m * far / tau
-        pair = -ahead * np.expm1(fall) - 2.0 * far * np.exp(fall)
-        total += np.exp(-(m - 1.0) * (m - 1.0 + 2.0 * near) / (2.0 * tau)) * pair
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.log(total) - near**2 / (2.0 * tau) - (_LOG_2PI + 3.0 * np.log(tau)) / 2.0)
-
-
-def log_waves(tau: FloatArray, near: FloatArray, far: FloatArray) -> FloatArray:
-    """Pi sum k sin(k pi w) exp(-k^2 pi^2 tau / 2), the sines from the nearer end."""
-    angle = math.pi * np.minimum(near, far)
-    mirrored = far < near
-    total = np.zeros_like(tau)
-    for k in range(1, WAVES + 1):
-        sine = np.where(mirrored & (k % 2 == 0), -1.0, 1.0) * np.sin(k * angle)
-        total += k * sine * np.exp(-(k * k - 1) * math.pi**2 * tau / 2.0)
-    return np.asarray(math.log(math.pi) + np.log(total) - math.pi**2 * tau / 2.0)
 
 
 def with_slopes(tau: NDArray[np.float64], near: FloatArray) -> LogDensity:
@@ -133,7 +77,7 @@ def with_slopes(tau: NDArray[np.float64], near: FloatArray) -> LogDensity:
 def _image_slopes(tau: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Of sum b exp(-b^2 / (2 tau)) / sqrt(2 pi tau^3), b = w + 2 k."""
     weights, total, squares, cubes = (np.zeros_like(tau) for _ in range(4))
-    for k in (0, -1, 1, -2, 2, -3):
+    for k in IMAGES:
         b = near + 2.0 * k
         weight = np.exp(-2.0 * k * (k + near) / tau)
         weights += weight
@@ -188,7 +132,7 @@ class Moments:
 
 
 def moments(drift: ArrayLike, boundary: ArrayLike, start: ArrayLike = 0.5) -> Moments:
-    """The moments of the decision time (without t0); the arguments broadcast. `ValueError`: as `log_density`.
+    """The moments of the decision time (without t0); the arguments broadcast. `ValueError`: as `check_bounds`.
 
     >>> found = moments(1.0, 2.0)
     >>> round(found.upper, 6), round(found.mean_s, 6), round(moments(0.0, 2.0).variance_s2, 6)
@@ -251,14 +195,14 @@ def distribution(
 ) -> Values:
     """P(T <= t, answer), rising from 0 to the answer's probability; divide by that for the time given the answer.
 
-    NaN at t = NaN.
-
-    The decision time is without t0; all arguments broadcast. `ValueError`: as `log_density`.
+    NaN at t = NaN. The decision time is without t0; all arguments broadcast. `ValueError`: as `check_bounds`.
 
     >>> round(distribution(100.0, True, 1.0, 2.0, 0.5), 6)
     0.880797
     """
-    t, up, v, a, w = _together(time_s, upper, drift, boundary, start)
+    t, v, a, w = (np.asarray(values, dtype=np.float64) for values in (time_s, drift, boundary, start))
+    t, up, v, a, w = np.broadcast_arrays(t, np.asarray(upper, dtype=np.bool_), v, a, w)
+    check_bounds(a, w)
     c, near = np.where(up, -v, v) * a, np.where(up, 1.0 - w, w)
     tau = np.where(t > 0.0, t, 1.0) / a**2
     value = np.empty(tau.shape)
@@ -271,7 +215,7 @@ def distribution(
 def _images(tau: FloatArray, c: FloatArray, near: FloatArray) -> FloatArray:
     """Sum sign(b) exp(-c w) [e^(-|c| b) Phi((|c| tau - b)/sqrt(tau)) + e^(|c| b) Phi(-(|c| tau + b)/sqrt(tau))]."""
     total, root, drift = np.zeros_like(tau), np.sqrt(tau), np.abs(c)
-    for k in (0, -1, 1, -2, 2, -3):
+    for k in IMAGES:
         b = np.abs(near + 2.0 * k)
         first = scipy.special.log_ndtr((drift * tau - b) / root) - drift * b
         second = scipy.special.log_ndtr(-(drift * tau + b) / root) + drift * b
