@@ -11,7 +11,7 @@ from analysis.summary.requests import AnyRequest
 from experiments.config.door import EligibilityConfig, StudyConfig
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.design.methods_section import methods_section
+from experiments.design.methods_section import joined_by_and, methods_section
 from experiments.design.planned import runs_of_groups
 from experiments.study.preregistration import KeyChange, Preregistration, plain_value
 
@@ -69,7 +69,7 @@ def _hypotheses(planned: Planned) -> Iterator[str]:
 def _sample(planned: Planned) -> Iterator[str]:
     study = planned.study
     yield "## Participants and stop rule"
-    yield f"{study.participants} participants do {_and([setup.config.title for setup in planned.setups])}."
+    yield f"{study.participants} participants do {joined_by_and([setup.config.title for setup in planned.setups])}."
     yield study.preregistration.stop_rule or (
         f"Nobody comes any more when {study.participants} participants have done everything. Who is excluded in the "
         "register does not count, and a new participant takes their place."
@@ -87,10 +87,6 @@ def _eligible(rules: EligibilityConfig) -> str:
     parts += [f"handedness {' or '.join(rules.handedness)}"] if rules.handedness else []
     parts += [f"sex {' or '.join(rules.sex)}"] if rules.sex else []
     return f"Who may take part: {'; '.join(parts)}." if parts else "Everybody may take part."
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _design(setup: Setup[DesignConfig]) -> Iterator[str]:
@@ -120,7 +116,7 @@ def _incomplete(names: Sequence[str]) -> Iterator[str]:
     if "preference" in names:
         yield "preference: who did not rate every method is left out of it."
     if others := [name for name in names if name not in ("direction", "preference")]:
-        yield f"{_and(others)}: who has no answer in some condition is in no test of that question."
+        yield f"{joined_by_and(others)}: who has no answer in some condition is in no test of that question."
 
 
 def _rules(rules: Rules) -> Iterator[str]:
@@ -180,6 +176,6 @@ def _request(one: AnyRequest) -> str:
 def _files(one: Preregistration) -> Iterator[str]:
     yield "## What is frozen"
     yield (
-        f"Every value of {_and([f'`{name}`' for name in one.files])}, with all defaults, as it stands in "
+        f"Every value of {joined_by_and([f'`{name}`' for name in one.files])}, with all defaults, as it stands in "
         f"`preregistration-{one.number}.json` beside this page. The hash is over that file: values and words."
     )

@@ -50,7 +50,7 @@ def _factors(design: DesignConfig) -> Iterator[str]:
         yield f"{_sentence(constant)} was the same in all trials."
     hands = [name for name in by_hand(design) if len(design.factors[name].all_levels) > 1]
     if hands:
-        yield f"The experimenter set {_listed(hands)} by hand."
+        yield f"The experimenter set {joined_by_and(hands)} by hand."
 
 
 def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
@@ -63,7 +63,7 @@ def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
         f"{factor_words(name)} ({len(some)} levels, {some[0]:g} to {some[-1]:g})"
         for name, some in zip(table.of, levels, strict=True)
     ]
-    text = _listed(ranges)
+    text = joined_by_and(ranges)
     was = "was" if len(ranges) == 1 else "were"
     yield f"{text[0].upper() + text[1:]} {was} chosen after each answer, {rule_words(table, levels)}."
 
@@ -71,7 +71,7 @@ def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
 def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
     levels = (", ".join(factor.label(level) for level in factor.all_levels) for _, factor in named)
     told = [f"{factor_words(name)} ({some})" for (name, _), some in zip(named, levels, strict=True)]
-    text = _listed(told)
+    text = joined_by_and(told)
     return text[0].upper() + text[1:]
 
 
@@ -97,10 +97,10 @@ def level_words(name: str, level: Level) -> str:
     return f"{shown_level(level)} {written_unit(unit)}" if unit else f"{factor_words(name)} {shown_level(level)}"
 
 
-def _listed(words: Sequence[str]) -> str:
+def joined_by_and(words: Sequence[str]) -> str:
     """Words as a sentence lists them.
 
-    >>> _listed(["a"]), _listed(["a", "b"]), _listed(["a", "b", "c"])
+    >>> joined_by_and(["a"]), joined_by_and(["a", "b"]), joined_by_and(["a", "b", "c"])
     ('a', 'a and b', 'a, b and c')
     """
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
@@ -128,7 +128,7 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     order, sessions = design.order, [run.sessions for run in runs]
     each = [trials for run in runs for trials in run.session_trials]
     if max(sessions) > 1:
-        blocked = _listed([factor_words(name) for name in order.session])
+        blocked = joined_by_and([factor_words(name) for name in order.session])
         yield f"There were {_counts(sessions)} sessions, each of one {blocked}, {_HOW[order.sessions]}."
     where = "In each session" if max(sessions) > 1 else "In the session"
     if design.adaptive is not None:
@@ -140,7 +140,7 @@ def _order(design: DesignConfig, runs: Sequence[PlannedRun]) -> Iterator[str]:
     if INSTRUCTION_FACTOR in design.factors:
         yield from _told(design, design.factors[INSTRUCTION_FACTOR])
     if order.set:
-        yield f"{_listed([factor_words(name) for name in order.set]).capitalize()} was constant in a set."
+        yield f"{joined_by_and([factor_words(name) for name in order.set]).capitalize()} was constant in a set."
     for name, most in order.longest_run.items():
         yield f"No level of {factor_words(name)} came more than {most} times in a row."
 
@@ -154,7 +154,7 @@ def _what_came(design: DesignConfig) -> str:
     mixed = [factor_words(name) for name in factors if len(factors[name].all_levels) > 1 and name not in apart]
     if not order.set or not mixed:
         return "condition"
-    return mixed[0] if len(mixed) == 1 else f"combination of {_listed(mixed)}"
+    return mixed[0] if len(mixed) == 1 else f"combination of {joined_by_and(mixed)}"
 
 
 def _tracks(design: DesignConfig, table: AdaptiveConfig, where: str, each: Sequence[int]) -> str:
@@ -191,7 +191,7 @@ def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
         yield f"Of the trials of a session {trial.catch} were catch trials, without a stimulus."
     yield "Participants were told whether they were right." if trial.feedback else "There was no feedback."
     if design.practice.repetitions:
-        each = _listed([factor_words(name) for name in design.practice.of])
+        each = joined_by_and([factor_words(name) for name in design.practice.of])
         told = ", with feedback" if design.practice.feedback else ""
         yield f"{design.practice.repetitions} of each {each} could be practised first{told}; that was not analysed."
 
@@ -229,7 +229,7 @@ def _questions(design: DesignConfig) -> Iterator[str]:
     for when, opening in (("trial", "After each trial"), ("block", "After a set, about each of its trials,")):
         asked = [question for question in design.questions.values() if question.when == when]
         if asked:
-            yield f"{opening} participants were asked: {_listed([_question(question) for question in asked])}."
+            yield f"{opening} participants were asked: {joined_by_and([_question(question) for question in asked])}."
 
 
 def _question(question: QuestionConfig) -> str:
