@@ -116,13 +116,13 @@ def odds_of(experiment: str, recurrences: Mapping[str, ArrayLike], assumptions: 
     return PatternOdds(experiment=experiment, replications=sizes.pop(), rows=tuple(rows), assumptions=assumptions)
 
 
-def wilson_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Wilson's score interval of a proportion. Source: Wilson 1927, JASA 22, 209.
+def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson's score interval of a proportion, at 95 %. Source: Wilson 1927, JASA 22, 209.
 
     >>> [round(x, 4) for x in wilson_interval(2, 10)]
     [0.0567, 0.5098]
     """
-    z = float(scipy.special.ndtri(0.5 + confidence / 2.0))
+    z = float(scipy.special.ndtri(0.975))
     share = successes / trials
     centre = share + z * z / (2.0 * trials)
     half = z * math.sqrt(share * (1.0 - share) / trials + z * z / (4.0 * trials * trials))

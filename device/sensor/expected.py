@@ -38,12 +38,12 @@ def modelled_acceleration(actuator: Method, time_s: Vector, hand: HandMechanics 
 
 
 @lru_cache(maxsize=64)
-def expected_shot(actuator: Method, rate_Hz: float, hand: HandMechanics | None = None) -> ExpectedShot | None:
+def expected_shot(actuator: Method, rate_Hz: float) -> ExpectedShot | None:
     """What is expected of a shot at so many samples a second; `None` where nothing moves, or the model gives no course.
 
     The means over several places of the samples, and their standard deviations.
     """
-    hand = hand or HandMechanics()
+    hand = HandMechanics()
     fine = np.arange(0.0, _HELD_S, FINE_S)
     try:
         course = modelled_acceleration(actuator, fine, hand)

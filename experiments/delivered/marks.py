@@ -225,6 +225,6 @@ def _judged_friction(
     return levels, next((one for one in found if one.mark), ShotVerdict())
 
 
-def shots_to_see(part_u: float, spread: DeliverySpread = FRICTION_SPREAD) -> float:
+def shots_to_see(part_u: float) -> float:
     """How many shots a change by `SLIP` is seen in on average, once a run's level is known: A / (e^2/2)."""
-    return SUM_LIMIT / (SLIP**2 / (spread.within**2 + part_u**2) / 2)
+    return SUM_LIMIT / (SLIP**2 / (FRICTION_SPREAD.within**2 + part_u**2) / 2)

@@ -347,23 +347,23 @@ def _root(covariance: FloatArray) -> FloatArray:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def band_of(contours: FloatArray, inside: float = INSIDE) -> Band:
+def band_of(contours: FloatArray) -> Band:
     """The global rank envelope of drawn contours (draws, frictions), and quantiles of each friction alone.
 
     A contour's depth is its most extreme rank over the frictions; the envelope is between the k-th lowest and k-th
-    highest voltage of each friction, k the largest for which at least the share `inside` is as deep (Myllymaki et al.
+    highest voltage of each friction, k the largest for which at least the share `INSIDE` is as deep (Myllymaki et al.
     2017, J R Stat Soc B 79, 381).
     """
     known = np.isfinite(contours).any(axis=0) | np.isinf(contours).all(axis=0)
     low, high, alone_low, alone_high = (np.full(contours.shape[1], math.nan) for _ in range(4))
     if known.any():
         ordered = np.sort(contours[:, known], axis=0)
-        k = _depth(contours[:, known], inside)
-        tail = round((1.0 - inside) / 2.0 * len(contours))
+        k = _depth(contours[:, known])
+        tail = round((1.0 - INSIDE) / 2.0 * len(contours))
         low[known], high[known] = ordered[k - 1], ordered[-k]
         alone_low[known], alone_high[known] = ordered[tail], ordered[-1 - tail]
     return Band(
-        inside=inside,
+        inside=INSIDE,
         draws=len(contours),
         low_V=low,
         high_V=high,
@@ -374,14 +374,14 @@ def band_of(contours: FloatArray, inside: float = INSIDE) -> Band:
     )
 
 
-def _depth(contours: FloatArray, inside: float) -> int:
-    """The largest depth that the share `inside` of the contours has; equals count as the deepest of them."""
+def _depth(contours: FloatArray) -> int:
+    """The largest depth that the share `INSIDE` of the contours has; equals count as the deepest of them."""
     ordered = np.sort(contours, axis=0)
     depths = np.full(len(contours), len(contours))
     for column, row in zip(ordered.T, contours.T, strict=True):
         below, not_above = np.searchsorted(column, row, side="right"), np.searchsorted(column, row, side="left")
         depths = np.minimum(depths, np.minimum(below, len(row) - not_above))
-    return int(np.sort(depths)[math.floor((1.0 - inside) * len(depths))])
+    return int(np.sort(depths)[math.floor((1.0 - INSIDE) * len(depths))])
 
 
 DEFAULT = PerceptParameters()

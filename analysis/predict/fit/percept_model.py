@@ -189,20 +189,18 @@ def fit_percept(
     *,
     trials: int = PAPER_TRIALS,
     people: People = ALIKE,
-    base: PerceptParameters = USUAL,
 ) -> PerceptFit:
     """Sensitivity, confusion and start by maximum likelihood from the methods' mean forward rates.
 
-    Binomial likelihood of `trials` answers a method; `people` are the assumed spreads, over which the rates are means;
-    `base` holds the assumed numbers. `ValueError`: fewer than three methods, a rate outside 0..1, no trials, or a rate
-    of a method that is not given.
+    Binomial likelihood of `trials` answers a method; `people` are the assumed spreads, over which the rates are means.
+    `ValueError`: fewer than three methods, a rate outside 0..1, no trials, or a rate of a method that is not given.
 
     >>> from device.methods import paper_methods
     >>> found = fit_percept(PAPER_RATES, paper_methods())
     >>> round(found.fitted["start"].value, 3), round(found.deviance, 6), found.freedom, found.rank
     (0.557, 0.0, 0, 3)
     """
-    likelihood = _likelihood_of(rates, methods, trials, people, base)
+    likelihood = _likelihood_of(rates, methods, trials, people, USUAL)
     place, deviance = _lowest(likelihood)
     parameters = likelihood.at(place)
     matrix = _information(likelihood, parameters)
@@ -232,7 +230,10 @@ def best_percept(
     people: People = ALIKE,
     base: PerceptParameters = USUAL,
 ) -> PerceptPeak:
-    """The numbers of `fit_percept` alone, thirty times as fast: the profile takes the time."""
+    """The numbers of `fit_percept` alone, thirty times as fast: the profile takes the time.
+
+    `base` holds the assumed numbers.
+    """
     likelihood = _likelihood_of(rates, methods, trials, people, base)
     place, deviance = _lowest(likelihood)
     parameters = likelihood.at(place)
