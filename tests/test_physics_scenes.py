@@ -62,7 +62,7 @@ def test_every_cheaper_model_would_be_beyond_what_the_scene_bears(gun: GunParame
 
 
 def stated(fidelity: str, output: str, gun: GunParameters) -> float:
-    """As the table of `tiers` has it; an error e of the speed is (1 + e)^2 - 1 of the collision."""
+    """As `scenes` has it; an error e of the speed is (1 + e)^2 - 1 of the collision."""
     if output == "collision_force_N":
         return (1.0 + stated_error(fidelity, "impact_speed_m_s", gun.drive_off, gun.emf)) ** 2 - 1.0
     return stated_error(fidelity, output, gun.drive_off, gun.emf)

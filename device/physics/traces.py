@@ -244,7 +244,7 @@ class EnergyBalance:
 
 
 def energy_balance(gun: GunParameters) -> EnergyBalance:
-    """The audit of one shot from rest."""
+    """The energies and impulses of one shot from rest."""
     shot = list(segments(pack(gun)))
     supplied, heat, motor, emf, force = (math.fsum(row) for row in zip(*map(_integrals, shot), strict=True))
     friction = math.fsum(_friction_work(segment) for segment in shot)

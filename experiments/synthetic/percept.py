@@ -11,7 +11,8 @@ the returning magnet is a second pulse; by equation (1) it points the same way a
 it "could distort the perceived direction", so it counts as confusion that divides the evidence, without a sign.
 A vibration has no force that is published and no direction that could be felt: its evidence is 0.
 The evidence is the log odds of a right answer by an unbiased diffusion: drift times boundary. All of this is a model's
-guess: only `exponent` has a source, three numbers are fitted to three rates (`percept_fit`), the rest is assumed.
+guess: only `exponent` has a source, three numbers are fitted to three rates (`recoil fit percept`), the rest is
+assumed.
 """
 
 from __future__ import annotations

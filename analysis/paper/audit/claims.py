@@ -44,7 +44,7 @@ CHECKS: Mapping[str, Callable[..., CheckResult]] = MappingProxyType(
         "total": total,
     }
 )
-"""Name in a paper's file -> check; a claim's other keys are the check's arguments (`paper_file` types them)."""
+"""Name in a paper's file -> check; a claim's other keys are the check's arguments (`AnyClaim` types them)."""
 
 
 class Claim(Model):

@@ -169,7 +169,7 @@ def rates(felt: FloatArray, parameters: PerceptParameters) -> FloatArray:
 
 
 def predict(felt: FloatArray, fit: PerceptFit) -> Predicted:
-    """The rates with the fit's uncertainty: the delta method on the logit, as `percept_fit.predicted_rate`."""
+    """The rates with the fit's uncertainty: the delta method on the logit, as `predicted_rate`."""
     best = fit.parameters
     centre = _logit_of(felt, best)
     slopes = np.stack([_slope(felt, best, name) for name in FITTED], axis=-1)
