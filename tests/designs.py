@@ -37,6 +37,11 @@ def changed(name: str, laws: Tables | None = None, **tables: Any) -> Setup[Desig
     return replace(setup, config=config, laws=people)
 
 
+def laws_of(setup: Setup[DesignConfig]) -> SyntheticAnswers:
+    assert isinstance(setup.laws, SyntheticAnswers)
+    return setup.laws
+
+
 def merged(values: Tables, changes: Tables) -> dict[str, Any]:
     """Tables with some values changed, those of inner tables beside what they hold."""
     found = dict(values)

@@ -47,6 +47,11 @@ def trial_rows(code: str = "P01", seed: int = 1, methods: tuple[str, ...] = METH
     return rows
 
 
+def by_hand(rows: list[TextRow]) -> list[TextRow]:
+    """The rows, all entered by the experimenter."""
+    return [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in rows]
+
+
 def rating_rows(code: str = "P01", seed: int = 1, methods: tuple[str, ...] = METHODS) -> list[TextRow]:
     """One participant's ratings, a spread of 1.5 around the mean of each method."""
     rng = np.random.default_rng(seed)
@@ -104,3 +109,8 @@ def write_many(folder: Path, participants: int) -> Path:
             row |= {"gun": "simulated", "response_time_s": f"{0.6 + rng.random():.6f}"}
         write_rows(trials_path(folder, f"P{i:05d}"), rows)
     return folder
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, by its path there."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

@@ -29,6 +29,7 @@ from experiments.study.register import RegisterError
 from tests.archived_studies import NAME, SECRET_PLACES, WORDS, sealed, small_study
 from tests.conftest import Recoil, refused
 from tests.journals import forged, raw
+from tests.log_files import tree, write_study
 
 pytestmark = pytest.mark.slow
 
@@ -55,10 +56,6 @@ def copy(made: tuple[Path, Path, Archived], tmp_path: Path) -> Path:
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def tree(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 # what is in it
@@ -474,8 +471,6 @@ def test_a_register_that_cannot_be_trusted_ends_it(made: tuple[Path, Path, Archi
 
 
 def test_logs_that_no_journal_proves_are_no_archive(tmp_path: Path) -> None:
-    from tests.log_files import write_study
-
     logs = write_study(tmp_path / "logs", 2)
     with pytest.raises(PlaceError, match="no run has a journal that proves its table"):
         archive_export.export_archive(ArchiveRequest(folder=logs, out=tmp_path / "archive"))

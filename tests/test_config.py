@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from experiments.config.door import ConfigError, StudyConfig, leaves, participant_codes
-from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.planned import PlannedRun, planned_run
 from experiments.design.planning import plan_of
 from experiments.load import load_setup, load_study, shipped_folder
-from experiments.synthetic.laws import RatesLaw, SyntheticAnswers
-from tests.designs import changed, direction_with
+from experiments.synthetic.laws import RatesLaw
+from tests.designs import changed, direction_with, laws_of
 
 SETUPS = {name: load_setup(name) for name in ("direction", "preference")}
 DIRECTION, PREFERENCE = SETUPS["direction"].config, SETUPS["preference"].config
@@ -26,11 +25,6 @@ DIRECTION, PREFERENCE = SETUPS["direction"].config, SETUPS["preference"].config
 def run_of(config: DesignConfig) -> PlannedRun:
     """What a run comes to; `ConfigError` for more than the design lets a participant be asked for."""
     return planned_run(config, plan_of(config, "P01", 1))
-
-
-def laws_of(setup: Setup[DesignConfig]) -> SyntheticAnswers:
-    assert isinstance(setup.laws, SyntheticAnswers)
-    return setup.laws
 
 
 # what the paper fixes (section III)

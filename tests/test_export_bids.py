@@ -28,7 +28,7 @@ from experiments.study.register import append, entry
 from recoil.config_files import new_study
 from tests.bids_validator import validated
 from tests.conftest import RECOIL, Recoil, refused
-from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
+from tests.log_files import rating_rows, ratings_path, tree, trial_rows, trials_path, write_rows, write_study
 from tests.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
@@ -107,10 +107,6 @@ def exported(real: Path) -> Path:
 def table(folder: Path, path: str) -> list[dict[str, str]]:
     with (folder / path).open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream, delimiter="\t", quoting=csv.QUOTE_NONE, lineterminator="\n"))
-
-
-def tree(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 # what the validator says

@@ -24,7 +24,7 @@ from experiments.screens.synthetic import synthetic_screen
 from tests import figure_files
 from tests.conftest import Recoil
 from tests.decisions import decide_all, made
-from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_rows
+from tests.log_files import METHODS, TextRow, by_hand, trial_rows, trials_path, write_rows
 
 DRIFTS = {"vibration": 0.0, "asymmetric-1": 1.0, "asymmetric-2": 1.8}
 BOUNDARIES = {"speed": 1.2, "accuracy": 1.8}
@@ -146,10 +146,6 @@ def test_a_table_that_was_rebuilt_is_used_and_named(tmp_path: Path) -> None:
     page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "Used, but: sub-P01" in page
     assert "made again from this journal" in page
-
-
-def by_hand(rows: list[TextRow]) -> list[TextRow]:
-    return [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in rows]
 
 
 def test_times_by_the_experimenter_s_hand_are_refused_with_the_reason(tmp_path: Path, recoil: Recoil) -> None:

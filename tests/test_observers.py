@@ -17,9 +17,9 @@ from experiments.design.streams import Stream
 from experiments.load import load_setup
 from experiments.screens.synthetic import synthetic_screen
 from experiments.synthetic.answers import GivenAnswer, draw_ratings, synthetic_participant_of
-from experiments.synthetic.laws import RatesLaw, RatingsLaw, SyntheticAnswers, TableLaw
+from experiments.synthetic.laws import RatesLaw, RatingsLaw, TableLaw
 from experiments.tasks.questions import on_scale
-from tests.designs import changed
+from tests.designs import changed, laws_of
 
 pytestmark = pytest.mark.slow
 
@@ -30,11 +30,6 @@ METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 SCALE = PREFERENCE.config.questions["rating"].scale
 PEOPLE = 120
 PHI = NormalDist()
-
-
-def laws_of(setup: Setup[DesignConfig]) -> SyntheticAnswers:
-    assert isinstance(setup.laws, SyntheticAnswers)
-    return setup.laws
 
 
 def with_law(name: str, question: str, **values: object) -> Setup[DesignConfig]:

@@ -16,14 +16,9 @@ from analysis.summary import analyze as feature
 from analysis.summary.analyze import Request, analyze
 from analysis.summary.sections import sections
 from device.words import RecoilError
-from tests.log_files import write_study
+from tests.log_files import tree, write_study
 
 RECORD = "statistics.json"
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder, by its path there."""
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def put(out: Path, files: dict[str, str], *patterns: str) -> None:
@@ -40,7 +35,7 @@ def test_results_replace_those_before_them_and_what_is_left_of_these_is_named(
 ) -> None:
     out = tmp_path / "new" / "out"
     put(out, FIRST, "*_long.csv")
-    assert content(out) == {name: text.encode() for name, text in FIRST.items()}
+    assert tree(out) == {name: text.encode() for name, text in FIRST.items()}
     assert capsys.readouterr().err == ""
     (out / "my notes.txt").write_text("kept")
     put(out, {RECORD: "2", "report.html": "two", "report.md": "two", "figures/b.png": "two"}, "*_long.csv")
@@ -59,14 +54,14 @@ def test_a_report_of_something_else_is_not_replaced_and_that_is_said_before_any_
     (tmp_path / name).write_text("mine")
     with pytest.raises(RecoilError, match=rf"has a {re.escape(name)} of something else \(there is no statistics.json"):
         put(tmp_path, FIRST)
-    assert content(tmp_path) == {name: b"mine"}
+    assert tree(tmp_path) == {name: b"mine"}
 
 
 def test_a_record_without_a_report_is_of_something_else_and_not_replaced(tmp_path: Path) -> None:
     placing.write_file(tmp_path, RECORD, b"mine")
     with pytest.raises(RecoilError, match=rf"has a {re.escape(RECORD)} of something else"):
         put(tmp_path, FIRST)
-    assert content(tmp_path) == {RECORD: b"mine"}
+    assert tree(tmp_path) == {RECORD: b"mine"}
 
 
 @pytest.mark.parametrize("name", ["a_long.csv", "figures/a.png"])
@@ -75,7 +70,7 @@ def test_a_file_of_something_else_is_set_aside(tmp_path: Path, name: str, capsys
     placing.write_file(tmp_path, "other.txt", b"mine as well")
     put(tmp_path, FIRST)
     aside = name.replace(".", ".aside-1.")
-    assert content(tmp_path) == {
+    assert tree(tmp_path) == {
         **{name: text.encode() for name, text in FIRST.items()},
         aside: b"mine",
         "other.txt": b"mine as well",
@@ -94,7 +89,7 @@ def test_a_report_that_comes_while_results_are_worked_out_is_not_replaced(tmp_pa
 
     with pytest.raises(RecoilError, match=r"report.md of something else"):
         two_at_once()
-    assert content(out) == {"report.md": b"mine"}
+    assert tree(out) == {"report.md": b"mine"}
 
 
 def test_an_unusable_place_is_met_before_any_work(tmp_path: Path) -> None:
@@ -109,11 +104,11 @@ def test_where_one_file_cannot_be_put_none_is(tmp_path: Path, place: str, named:
     put(tmp_path, FIRST)
     (tmp_path / place).unlink()
     (tmp_path / place).mkdir()
-    before = content(tmp_path)
+    before = tree(tmp_path)
     with pytest.raises(IsADirectoryError) as caught:
         put(tmp_path, dict.fromkeys(FIRST, "2"))
     assert caught.value.filename == str(tmp_path / named)
-    assert content(tmp_path) == before
+    assert tree(tmp_path) == before
 
 
 def test_an_error_speaks_of_the_place_that_was_asked_for_and_folders_that_were_made_for_nothing_are_gone(
@@ -154,7 +149,7 @@ def test_two_at_work_in_one_folder_leave_each_other_alone(tmp_path: Path) -> Non
             placing.write_file(other, RECORD, b"other")
             placing.write_file(other, "report.md", b"other")
         assert (tmp_path / RECORD).read_bytes() == b"other"
-    assert content(tmp_path) == {RECORD: b"one", "report.md": b"one"}
+    assert tree(tmp_path) == {RECORD: b"one", "report.md": b"one"}
 
 
 def stops(*_: object) -> None:
@@ -168,9 +163,9 @@ def test_an_interrupted_analysis_leaves_the_one_before_as_it_was(
     write_study(tmp_path / "results", participants=3, seed=1)
     request = Request(paths=[tmp_path / "results"], out=tmp_path / "out")
     analyze(request)
-    before = content(tmp_path / "out")
+    before = tree(tmp_path / "out")
     assert {RECORD, "report.html", "direction_long.csv", "figures/figure-results.png"} <= before.keys()
     monkeypatch.setattr(where, what, stops)
     with pytest.raises(KeyboardInterrupt):
         analyze(request)
-    assert content(tmp_path / "out") == before
+    assert tree(tmp_path / "out") == before

@@ -39,7 +39,7 @@ from analysis.times.trade import ez, ez_people
 from experiments.design.streams import generator
 from experiments.record import tables
 from tests.decisions import decide_all
-from tests.log_files import METHODS, TextRow, trial_rows, trials_path, write_many, write_rows
+from tests.log_files import METHODS, TextRow, by_hand, trial_rows, trials_path, write_many, write_rows
 
 pytestmark = pytest.mark.slow
 
@@ -231,10 +231,6 @@ def test_accuracy_times_and_ez_are_the_closed_forms_of_the_diffusion(tmp_path: P
 
 
 # What is refused
-
-
-def by_hand(rows: list[TextRow]) -> list[TextRow]:
-    return [row | {"response_source": "experimenter", "response_time_valid": "0"} for row in rows]
 
 
 def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path: Path) -> None:
