@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -12,9 +10,7 @@ from typing import TYPE_CHECKING
 
 from device import DeviceError, Gun, open_gun
 from device.plugin.guard import interrupts_held
-from experiments.catalogues.catalogue import ENGLISH, Language, language
-from experiments.clock import Clock, date_text
-from experiments.config.door import ConfigError
+from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
@@ -22,17 +18,16 @@ from experiments.design.planning import plan_of, practice_of
 from experiments.design.shown_texts import setup_in
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import generator
+from experiments.earlier_run import EarlierRun, earlier_run, give_way, resumed_plan, words_shown
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.rebuild import table
 from experiments.record import replay
 from experiments.record.journal import (
     Contents,
+    Head,
     Journal,
     JournalError,
-    ShownLanguage,
-    begun,
-    hold_journal,
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
@@ -46,25 +41,12 @@ from experiments.session.steps import Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
-from experiments.written_tables import answers_in, tables_of_stopped, write_tables
+from experiments.written_tables import tables_of_stopped, write_tables
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from experiments.delivered.recorder import ShotRecorder
-
-
-class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wrong
-    """An unfinished run is there; the message says when it stopped, and that it takes a decision."""
-
-    def __init__(self, where: Place, contents: Contents) -> None:
-        last = contents.records[-1]
-        super().__init__(
-            f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
-            f"{date_text(last.utc)} after record {last.n}: {where.journal}; "
-            "--resume goes on with it, --fresh --reason TEXT sets it aside and starts anew"
-        )
-        self.where, self.contents = where, contents
 
 
 class GunNotClosed(DeviceError):  # noqa: N818 - what is left to be done
@@ -99,19 +81,19 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     place = _place(request, registered)
     if not place.journal.exists():
         request = replace(request, anew_reason="")
-    before = _before(place, request, clock)
-    if before is None:
-        _refuse_excluded(place, registered)
+    _refuse_excluded(place, registered)
+    earlier = earlier_run(place, request)
+    before = earlier.before
     with _open_gun(request, stimuli, clock) as gun, ExitStack() as turn:
         turn.enter_context(_own_turn(place, setup.config, before))
-        plan = _new_plan(request, place, registered) if before is None else _plan_of(before, request)
+        plan = _new_plan(request, place, registered) if before is None else resumed_plan(before, request, gun)
         stimuli.work_out(plan.trials)
         told: GrowingHistory = []
         session = design_session(plan, shown, told, request.language.messages)
         screen = make_screen(shown, plan, clock)
         with (
             _open_sensor(request, plan, stimuli, clock) as recorder,
-            _open(place, before, clock, each=request.each_synced) as journal,
+            _open(place, earlier, clock, each=request.each_synced) as journal,
         ):
             head = _circumstances(request, gun, clock)
             if before is None:
@@ -212,77 +194,22 @@ def _was_measured(before: Contents | None) -> bool:
     return before is not None and any(record.kind == "measured" for record in before.records)
 
 
-def _before(where: Place, request: RunRequest, clock: Clock) -> Contents | None:
-    """The unfinished run to go on with; `None` if there is none, or if it was set aside."""
-    if not where.journal.exists():
-        return None
-    anew = request.again == "fresh" or request.practice
-    try:
-        contents = begun(where.journal)
-    except JournalError:
-        if not anew:
-            raise
-        contents = None
-    if contents is not None and _gives_way(contents, request):
-        request, anew = replace(request, anew_reason=GAVE_WAY), True
-    else:
-        _refuse_finished(where, contents)
-    os.close(hold_journal(where.journal))  # refused while another run is at it
-    if contents is not None and not anew:
-        if request.again == "ask":
-            raise UnfinishedRun(where, contents)
-        return contents
-    _refuse_unsaid(where, contents, request)
-    _record_reason(where, request.anew_reason, clock)
-    folders.set_aside(where)
-    return None
-
-
-def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest) -> None:
-    """`PlaceError`: what a person answered is set aside, and nobody says why."""
-    if contents is None or request.practice or request.anew_reason or contents.head.participant != "person":
-        return
-    if count := answers_in(contents):
-        raise PlaceError(
-            f"{where.journal}: has answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
-        )
-
-
-GAVE_WAY = "a synthetic run, which gave way to a person's"
-
-
-def _gives_way(contents: Contents, request: RunRequest) -> bool:
-    """Whether a synthetic run stands where a person comes to: it does not use up their place."""
-    synthetic = contents.head.participant == "synthetic"
-    return synthetic and not request.simulated and not request.practice and request.again != "resume"
-
-
-def _record_reason(where: Place, reason: str, clock: Clock) -> None:
-    """Have the reason on record before anything is moved."""
-    if reason:
-        one = register.entry("set-aside", where.participant_id, experiment=where.experiment, reason=reason)
-        register.append(where.results, one, clock)
-
-
-def _refuse_finished(where: Place, contents: Contents | None) -> None:
-    if contents is not None and contents.finished and not where.practice:
-        raise PlaceError(
-            f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
-            "one finished run a participant and experiment, so use another code"
-        )
-
-
 def _own_turn(place: Place, config: DesignConfig, before: Contents | None) -> AbstractContextManager[None]:
     is_new = before is None and not place.practice
     return folders.own_turn(place.results, config) if is_new else nullcontext()
 
 
 def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
+    """The plan of a new run; one that gives way to it has no part in the balance any more."""
     setup, seed = request.setup, resolve_seed(request)
     by = request.participant_kind
-    group = balance.group_of_next_run(setup, place.results, registered, by=by)
+
+    def of_others(path: Path) -> Head | None:
+        return None if path == place.journal else journal_head(path)
+
+    group = balance.group_of_next_run(setup, place.results, registered, of_others, by=by)
     if not request.practice:
-        row = balance.row_of_next_run(setup, place.results, registered, by=by)
+        row = balance.row_of_next_run(setup, place.results, registered, of_others, by=by)
         return plan_of(setup.config, place.participant_id, seed, row=row, group=group)
     plan = practice_of(setup.config, place.participant_id, seed, group=group)
     if plan is None:
@@ -290,86 +217,22 @@ def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     return plan
 
 
-def _plan_of(before: Contents, request: RunRequest) -> Plan:
-    """The plan of the run to go on with. `PlaceError` if the files or the seed are not those it began with."""
-    began, now = before.head.setup_sha256, request.setup.sha256()
-    given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
-    if began != now:
-        raise PlaceError(
-            f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
-        )
-    plan = before.plan
-    people = request.setup.laws.model_dump(mode="json") if request.setup.laws is not None else None
-    if request.simulated and before.head.laws_json not in (None, people):
-        raise PlaceError(
-            f"{before.path}: the run began with other synthetic people than {request.setup.config.synthetic} has now; "
-            f"resume with those it began with, whom {given_back} gives back, or start anew (--fresh)"
-        )
-    _check_same_language(before, request)
-    if request.seed is not None and request.seed != plan.seed:
-        raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
-    return plan
-
-
 def _language_record(request: RunRequest) -> dict[str, object]:
     """What the head of a journal says of the participant's language: nothing where it is English alone."""
-    words, one = _words_shown(request), request.language
+    words, one = words_shown(request), request.language
     if words is None:
         return {}
     named = {"code": one.code, "name": one.name, "checked_by": one.checked_by}
     return {"language": {**named, "messages": words[0], "texts": words[1]}}
 
 
-def _words_shown(request: RunRequest) -> tuple[dict[str, str], dict[str, str]] | None:
-    """The messages of a run, and what it shows for the texts of its design; `None` where it is English alone."""
-    _, texts = setup_in(request.language, request.setup)
-    return None if request.language is ENGLISH else (asdict(request.language.messages), texts)
-
-
-def _check_same_language(before: Contents, request: RunRequest) -> None:
-    """`PlaceError` if the run began in another language, or in other words of it: it was shown so up to here."""
-    began, now = before.head.language, request.language
-    code = ENGLISH.code if began is None else began.code
-    if code != now.code:
-        raise PlaceError(f"{before.path}: the run began in {code}, not in {now.code}; resume with --language {code}")
-    if _words_shown(request) != (None if began is None else (began.messages, began.texts)):
-        raise PlaceError(
-            f"{before.path}: the run began with another catalogue {code} than there is now; resume with the one it "
-            "began with (--catalogues DIR), or start anew (--fresh)"
-        )
-
-
-def language_begun_in(request: RunRequest) -> ShownLanguage | None:
-    """The language of the run that is there, by its journal; `None` where it is English, or nothing is on record."""
-    where = folders.place(request.results, request.participant_id, request.setup.config.experiment)
-    head = journal_head(where.journal) if where.journal.exists() else None
-    return None if head is None else head.language
-
-
-def gone_on_with(request: RunRequest) -> RunRequest:
-    """A request that goes on with a run, in that run's language: that it may be used was said when the run began.
-
-    `ConfigError`, if its catalogue is not there any more.
-    """
-    if request.again != "resume":
-        return request
-    began = language_begun_in(request)
-    return replace(request, language=ENGLISH if began is None else begun_language(began.code, request.catalogues))
-
-
-def begun_language(code: str, folder: Path | None) -> Language:
-    """The language that a run began in. `ConfigError`, if its catalogue is not there any more."""
-    try:
-        return language(code, folder)
-    except ConfigError as error:
-        raise ConfigError(f"the run began in {code}, which it needs to go on (--catalogues DIR). {error}") from error
-
-
-def _open(place: Place, before: Contents | None, clock: Clock, *, each: bool) -> Journal:
-    if before is not None:
-        clock.go_on_after(before.records[-1].utc)
-        return Journal.reopen(before, clock, each=each)
+def _open(place: Place, earlier: EarlierRun, clock: Clock, *, each: bool) -> Journal:
+    """The journal to write. What gives way is moved only now, when nothing refuses the new run any more."""
+    if earlier.before is not None:
+        clock.go_on_after(earlier.before.records[-1].utc)
+        return Journal.reopen(earlier.before, clock, each=each)
+    if earlier.gives_way:
+        give_way(place, earlier.reason, clock)
     folders.make_results(place.folder)
     return Journal.create(place.journal, clock, each=each)
 

@@ -137,7 +137,10 @@ class _Runner:
             return
         self._failures = self._failures + 1 if isinstance(outcome, steps.Failed) else 0
         if isinstance(outcome, steps.Failed) and self._failures == MAX_FAILURES:
-            raise RunStopped(f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}")
+            raise RunStopped(
+                f"the gun failed {MAX_FAILURES} times in a row, last: {outcome.cause}; before it goes on see to the "
+                "gun's power and cable, and have `recoil doctor` say what is wrong"
+            )
 
     def _do(self, step: steps.Step) -> steps.Outcome:  # noqa: C901, PLR0911 - one case a step
         match step:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -19,11 +20,12 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.shown_texts import letters_of
+from experiments.earlier_run import begun_language, language_begun_in
 from experiments.live_run import RunStopped, Screen
 from experiments.rebuild import rebuild, rows_beyond, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
-from experiments.run import Finished, begun_language, language_begun_in, run
+from experiments.run import Finished, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
@@ -88,7 +90,8 @@ def _how_to_go_on(request: RunRequest) -> str:
     if request.practice:
         return "A practice is begun anew each time: --practice."
     begun = place(request.results, request.participant_id, request.setup.config.experiment).journal.exists()
-    return "Go on with --resume." if begun else "Nothing of the run had begun."
+    gun = "" if request.gun == "simulated" else f" --gun {shlex.quote(request.gun)}"
+    return f"Go on with --resume{gun}." if begun else "Nothing of the run had begun."
 
 
 def _markers(results: Path, say: Callable[[str], None]) -> AbstractContextManager[None]:
@@ -182,7 +185,10 @@ def _check_terminal(request: RunRequest) -> None:
 
 def _check_screen(request: RunRequest) -> None:
     if request.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise PlaceError("--screen terminal: standard input and output are no terminal; use --screen synthetic")
+        raise PlaceError(
+            "--screen terminal: standard input and output are no terminal: start it without a pipe, or use --screen "
+            "console, which has a window; --screen synthetic is answered by a synthetic participant"
+        )
     if request.screen != "console" and (request.visual or request.options != ParticipantOptions()):
         raise PlaceError(
             "--visual, --participant-screen, --participant-keys, --participant-monitor and --noise go with "

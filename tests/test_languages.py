@@ -41,9 +41,10 @@ from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of
 from experiments.design.shown_texts import letters_of, setup_in, shown_texts, texts_in
 from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
+from experiments.earlier_run import gone_on_with
 from experiments.load import load_setup
 from experiments.record.journal import ShownLanguage, read_journal
-from experiments.run import gone_on_with, run
+from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens import phrases as phrases_of_the_console
 from experiments.screens import texts

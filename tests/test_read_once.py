@@ -11,10 +11,11 @@ import pytest
 from device import open_gun
 from experiments import rebuild
 from experiments.clock import VirtualClock
+from experiments.earlier_run import UnfinishedRun
 from experiments.load import load_setup
 from experiments.record import storage
 from experiments.record.journal import Journal, JournalError, read_journal
-from experiments.run import UnfinishedRun, run
+from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register

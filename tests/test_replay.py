@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from experiments.clock import VirtualClock
+from device import DeviceError
+from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
@@ -378,6 +379,71 @@ def test_a_reason_that_cannot_be_recorded_leaves_the_run_where_it_is(
         )
     assert journal.read_bytes() == before
     assert not list(journal.parent.glob("*aside*"))
+
+
+def refused_anew(results: Path, match: str, **how: Any) -> None:
+    """A run that is begun anew for a reason, and refused: the one that is there stays, and nothing is on record."""
+    journal = place(results, "P01", "preference").journal
+    before = {file: file.read_bytes() for file in results.rglob("*") if file.is_file()}
+    asked = replace(request("preference", results, "fresh"), anew_reason="the gun came loose", **how)
+    with pytest.raises((PlaceError, DeviceError), match=match):
+        run(asked, synthetic_screen, RealClock() if "gun" in how else VirtualClock())
+    assert before == {file: file.read_bytes() for file in results.rglob("*") if file.is_file()}
+    assert journal in before
+
+
+def test_a_fresh_run_whose_gun_cannot_be_opened_leaves_the_unfinished_one_where_it_is(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    broken_off(unbroken["preference"], tmp_path, 6)
+    refused_anew(tmp_path, "no-such-port", gun="serial:/dev/no-such-port")
+
+
+def test_a_fresh_run_whose_sensor_is_refused_leaves_the_unfinished_one_where_it_is(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    broken_off(unbroken["preference"], tmp_path, 6)
+    refused_anew(tmp_path, "--sensor csv:nowhere.csv", sensor="csv:nowhere.csv")
+
+
+@pytest.mark.parametrize("again", ["resume", "fresh", "ask"])
+def test_the_run_of_somebody_who_is_excluded_neither_goes_on_nor_gives_way(
+    again: Again, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    before = journal.read_bytes()
+    register.append(tmp_path, register.entry("excluded", "P01", reason="felt ill"), VirtualClock())
+    asked = replace(request("preference", tmp_path, again), anew_reason="again")
+    with pytest.raises(PlaceError, match=r"P01 is excluded \(felt ill\); readmit them"):
+        run(asked, synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == before
+
+
+@pytest.mark.parametrize("again", ["resume", "fresh", "ask"])
+def test_a_journal_of_another_participant_is_never_gone_on_with_nor_set_aside(
+    again: Again, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    theirs = place(tmp_path, "P02", "preference")
+    theirs.folder.mkdir()
+    copied = journal.rename(theirs.journal).read_bytes()
+    asked = replace(request("preference", tmp_path, again), participant_id="P02", anew_reason="again")
+    with pytest.raises(JournalError, match=r"is of participant P01, experiment preference; it was renamed or copied"):
+        run(asked, synthetic_screen, VirtualClock())
+    assert theirs.journal.read_bytes() == copied
+
+
+def test_a_run_that_began_on_a_gun_is_not_gone_on_with_where_nothing_is_felt(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    records = raw(journal)
+    records[0]["gun"] |= {"model": "haptic-gun", "serial": "77"}
+    journal.write_bytes(forged(records))
+    before = journal.read_bytes()
+    with pytest.raises(PlaceError, match=r"began on haptic-gun:77, and --gun simulated is simulated: .*the --gun it"):
+        run(request("preference", tmp_path, "resume"), synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == before
 
 
 @pytest.mark.parametrize("again", ["ask", "resume", "fresh"])

@@ -19,6 +19,7 @@ from experiments.config.findings import CODE
 from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan
 from experiments.design.planned import order_shown
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.rebuild import began_with
@@ -342,11 +343,7 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
     if contents is None:
         return RunProgress(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
     plan = contents.plan
-    if (plan.participant_id, plan.experiment) != (where.participant_id, where.experiment):
-        raise JournalError(
-            f"{where.journal}: line 1: is of participant {plan.participant_id}, experiment {plan.experiment}; "
-            "it was renamed or copied here, so put it back"
-        )
+    check_own(where, plan)
     head, told, design = contents.head, replay.history(contents), began_with(contents.head)
     state: RunState = "done" if contents.finished else "open elsewhere" if elsewhere else "in progress"
     return RunProgress(
@@ -359,6 +356,15 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
         data=data_of(head),
         language="" if head.language is None else f"{head.language.code} ({head.language.name})",
     )
+
+
+def check_own(where: Place, plan: Plan) -> None:
+    """`JournalError` if the journal that stands there has the plan of another participant or experiment."""
+    if (plan.participant_id, plan.experiment) != (where.participant_id, where.experiment):
+        raise JournalError(
+            f"{where.journal}: line 1: is of participant {plan.participant_id}, experiment {plan.experiment}; "
+            "it was renamed or copied here, so put it back"
+        )
 
 
 def data_of(head: Head) -> tables.DataKind:

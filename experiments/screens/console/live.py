@@ -22,10 +22,11 @@ from experiments.clock import RealClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.shown_texts import setup_in
+from experiments.earlier_run import UnfinishedRun, gone_on_with
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.run import Finished, UnfinishedRun, gone_on_with
+from experiments.run import Finished
 from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application

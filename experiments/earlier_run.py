@@ -1,0 +1,187 @@
+"""The run that stands where another one is to be: it is gone on with, or gives way, or is in the way and says so."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
+
+from device import Gun
+from experiments.catalogues.catalogue import ENGLISH, Language, language
+from experiments.clock import Clock, date_text
+from experiments.config.door import ConfigError
+from experiments.design.plan import Plan
+from experiments.design.shown_texts import setup_in
+from experiments.record.journal import Contents, JournalError, ShownLanguage, begun, hold_journal
+from experiments.record.journal import head as journal_head
+from experiments.record.tables import is_simulated
+from experiments.run_request import RunRequest
+from experiments.study import folders, register
+from experiments.study.folders import Place, PlaceError
+from experiments.written_tables import answers_in
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wrong
+    """An unfinished run is there; the message says when it stopped, and that it takes a decision."""
+
+    def __init__(self, where: Place, contents: Contents) -> None:
+        last = contents.records[-1]
+        super().__init__(
+            f"participant {where.participant_id} has an unfinished run of {where.experiment}, stopped at "
+            f"{date_text(last.utc)} after record {last.n}: {where.journal}; "
+            "--resume goes on with it, --fresh --reason TEXT sets it aside and starts anew"
+        )
+        self.where, self.contents = where, contents
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EarlierRun:
+    """What stands where a run is to be: a run to go on with, or one that gives way to a new one, for a reason."""
+
+    before: Contents | None = None
+    gives_way: bool = False
+    reason: str = ""
+
+
+def earlier_run(where: Place, request: RunRequest) -> EarlierRun:
+    """What stands there. Nothing is moved yet: the gun, the sensor or the plan may be refused."""
+    if not where.journal.exists():
+        return EarlierRun()
+    anew = request.again == "fresh" or request.practice
+    try:
+        contents = begun(where.journal)
+    except JournalError:
+        if not anew:
+            raise
+        contents = None
+    if contents is not None:
+        folders.check_own(where, contents.plan)
+    if contents is not None and _gives_way(contents, request):
+        request, anew = replace(request, anew_reason=GAVE_WAY), True
+    else:
+        _refuse_finished(where, contents)
+    os.close(hold_journal(where.journal))  # refused while another run is at it
+    if contents is not None and not anew:
+        if request.again == "ask":
+            raise UnfinishedRun(where, contents)
+        return EarlierRun(before=contents)
+    _refuse_unsaid(where, contents, request)
+    return EarlierRun(gives_way=True, reason=request.anew_reason)
+
+
+def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest) -> None:
+    """`PlaceError`: what a person answered is set aside, and nobody says why."""
+    if contents is None or request.practice or request.anew_reason or contents.head.participant != "person":
+        return
+    if count := answers_in(contents):
+        raise PlaceError(
+            f"{where.journal}: has answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
+        )
+
+
+GAVE_WAY = "a synthetic run, which gave way to a person's"
+
+
+def _gives_way(contents: Contents, request: RunRequest) -> bool:
+    """Whether a synthetic run stands where a person comes to: it does not use up their place."""
+    synthetic = contents.head.participant == "synthetic"
+    return synthetic and not request.simulated and not request.practice and request.again != "resume"
+
+
+def give_way(where: Place, reason: str, clock: Clock) -> None:
+    """Set aside what stands there, with the reason on record before anything is moved."""
+    os.close(hold_journal(where.journal))  # nobody went on with it meanwhile
+    if reason:
+        one = register.entry("set-aside", where.participant_id, experiment=where.experiment, reason=reason)
+        register.append(where.results, one, clock)
+    folders.set_aside(where)
+
+
+def _refuse_finished(where: Place, contents: Contents | None) -> None:
+    if contents is not None and contents.finished and not where.practice:
+        raise PlaceError(
+            f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
+            "one finished run a participant and experiment, so use another code"
+        )
+
+
+def resumed_plan(before: Contents, request: RunRequest, gun: Gun) -> Plan:
+    """The plan of the run to go on with. `PlaceError` if files, seed or kind of gun are not those it began with."""
+    began, now = before.head.setup_sha256, request.setup.sha256()
+    given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
+    if began != now:
+        raise PlaceError(
+            f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
+            f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
+        )
+    plan = before.plan
+    people = request.setup.laws.model_dump(mode="json") if request.setup.laws is not None else None
+    if request.simulated and before.head.laws_json not in (None, people):
+        raise PlaceError(
+            f"{before.path}: the run began with other synthetic people than {request.setup.config.synthetic} has now; "
+            f"resume with those it began with, whom {given_back} gives back, or start anew (--fresh)"
+        )
+    _check_same_language(before, request)
+    _check_same_kind_of_gun(before, request, gun)
+    if request.seed is not None and request.seed != plan.seed:
+        raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
+    return plan
+
+
+def _check_same_kind_of_gun(before: Contents, request: RunRequest, gun: Gun) -> None:
+    """`PlaceError` if a run would be felt in part: it began on a gun and goes on without one, or on one after."""
+    began = before.head.gun
+    if began is not None and is_simulated(began.name) != is_simulated(gun.identify().name):
+        raise PlaceError(
+            f"{before.path}: the run began on {began.name}, and --gun {request.gun} is {gun.identify().name}: one of "
+            "them is simulated, where nothing is felt; resume with the --gun it began with, or start anew (--fresh)"
+        )
+
+
+def words_shown(request: RunRequest) -> tuple[dict[str, str], dict[str, str]] | None:
+    """The messages of a run, and what it shows for the texts of its design; `None` where it is English alone."""
+    _, texts = setup_in(request.language, request.setup)
+    return None if request.language is ENGLISH else (asdict(request.language.messages), texts)
+
+
+def _check_same_language(before: Contents, request: RunRequest) -> None:
+    """`PlaceError` if the run began in another language, or in other words of it: it was shown so up to here."""
+    began, now = before.head.language, request.language
+    code = ENGLISH.code if began is None else began.code
+    if code != now.code:
+        raise PlaceError(f"{before.path}: the run began in {code}, not in {now.code}; resume with --language {code}")
+    if words_shown(request) != (None if began is None else (began.messages, began.texts)):
+        raise PlaceError(
+            f"{before.path}: the run began with another catalogue {code} than there is now; resume with the one it "
+            "began with (--catalogues DIR), or start anew (--fresh)"
+        )
+
+
+def language_begun_in(request: RunRequest) -> ShownLanguage | None:
+    """The language of the run that is there, by its journal; `None` where it is English, or nothing is on record."""
+    where = folders.place(request.results, request.participant_id, request.setup.config.experiment)
+    head = journal_head(where.journal) if where.journal.exists() else None
+    return None if head is None else head.language
+
+
+def gone_on_with(request: RunRequest) -> RunRequest:
+    """A request that goes on with a run, in that run's language: that it may be used was said when the run began.
+
+    `ConfigError`, if its catalogue is not there any more.
+    """
+    if request.again != "resume":
+        return request
+    began = language_begun_in(request)
+    return replace(request, language=ENGLISH if began is None else begun_language(began.code, request.catalogues))
+
+
+def begun_language(code: str, folder: Path | None) -> Language:
+    """The language that a run began in. `ConfigError`, if its catalogue is not there any more."""
+    try:
+        return language(code, folder)
+    except ConfigError as error:
+        raise ConfigError(f"the run began in {code}, which it needs to go on (--catalogues DIR). {error}") from error
