@@ -82,6 +82,8 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     if not place.journal.exists():
         request = replace(request, anew_reason="")
     _refuse_excluded(place, registered)
+    if request.practice:
+        folders.refuse_without_practice(setup)
     earlier = earlier_run(place, request)
     before = earlier.before
     with _open_gun(request, stimuli, clock) as gun, ExitStack() as turn:
@@ -211,10 +213,7 @@ def _new_plan(request: RunRequest, place: Place, registered: Register) -> Plan:
     if not request.practice:
         row = balance.row_of_next_run(setup, place.results, registered, of_others, by=by)
         return plan_of(setup.config, place.participant_id, seed, row=row, group=group)
-    plan = practice_of(setup.config, place.participant_id, seed, group=group)
-    if plan is None:
-        raise PlaceError(f"{setup.source}: there is no practice (table [practice])")
-    return plan
+    return practice_of(setup.config, place.participant_id, seed, group=group)
 
 
 def _language_record(request: RunRequest) -> dict[str, object]:

@@ -245,6 +245,12 @@ def test_who_is_excluded_may_not_go_on_until_they_are_readmitted(study: StudyFol
 
 
 @pytest.mark.slow
+def test_a_practice_of_an_experiment_that_has_none_is_refused_before_anything_is_on_record(study: StudyFolder) -> None:
+    with pytest.raises(PlaceError, match=r"preference\.toml: there is no practice .*; begin the run itself"):
+        admit(study, entered(experiment="preference"), VirtualClock(), practice=True)
+    assert not register.read_register(study.results).entries
+
+
 @pytest.mark.parametrize("practice", [False, True])
 def test_a_run_that_is_open_elsewhere_is_neither_gone_on_with_nor_practised_for(
     practice: bool, study: StudyFolder

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -244,6 +245,36 @@ def test_of_masking_noise_the_console_says_why_it_stays_off_and_else_nothing(
         code, said = screen.stop()
     assert code == 130, said
     assert not plays or not told_of_noise(screen)
+
+
+def test_noise_that_ends_in_mid_run_is_said_and_shown_and_on_record(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    sink = tmp_path / "sink"
+    sink.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid\nexec cat > /dev/null\n")
+    sink.chmod(0o700)
+    (tmp_path / ".asoundrc").write_text(
+        f'pcm.!default {{ type file slave.pcm {{ type null }} file "|exec {sink}" format raw }}\n'
+    )
+    if not plays_sound(tmp_path):
+        pytest.skip("the sound library does not take its devices from ALSA")
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--noise")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.ready()
+        wait_for(lambda: remarks(journal, "noted"))
+        assert not screen.look().says("Masking noise: OFF")
+        os.kill(int((tmp_path / "pid").read_text()), signal.SIGKILL)
+        screen.until(lambda look: look.says("Masking noise has ended: its sound device is gone. Connect headphones"))
+        screen.until(lambda look: look.says("Masking noise: OFF"))
+        screen.keys.press("Return")
+        screen.to("asking", trial=1)
+        assert screen.look().says("Masking noise: OFF")
+        code, said = screen.stop()
+    assert code == 130, said
+    plays, ended = (one["text"] for one in remarks(journal, "noted"))
+    assert (plays, ended.split(":")[0]) == ("Masking noise plays.", "Masking noise has ended")
 
 
 def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mode(

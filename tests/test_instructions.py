@@ -105,7 +105,6 @@ def test_a_plan_with_instructions_is_read_back_and_has_a_hash_of_its_own() -> No
 
 def test_a_practice_has_no_instruction() -> None:
     practice = practice_of(HURRY.config, "P01", 1)
-    assert practice is not None
     assert {trial.instruction for trial in practice.trials} == {""}
 
 

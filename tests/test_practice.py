@@ -24,7 +24,6 @@ def practise(results: Path, setup: object = DIRECTION) -> Path:
 
 def test_a_practice_has_as_many_trials_of_each_method_and_direction_as_the_config_says() -> None:
     plan = practice_of(DIRECTION.config, "P01", 1)
-    assert plan is not None
     assert Counter(trial.method for trial in plan.trials) == dict.fromkeys(DIRECTION.config.methods, 2)
     assert Counter(trial.direction for trial in plan.trials) == {"forward": 3, "backward": 3}
     assert {(trial.session, trial.set) for trial in plan.trials} == {(1, 1)}

@@ -229,7 +229,6 @@ def test_catch_trials_and_practice_are_of_no_track() -> None:
     design = checked_table(DesignConfig, _bare(merged(ONE, changes)), "f.toml")
     plan, practice = plan_of(design, "P01", 1), practice_of(design, "P01", 1)
     assert Counter((trial.catch, trial.track > 0) for trial in plan.trials) == {(True, False): 8, (False, True): 80}
-    assert practice is not None
     assert all(isinstance(trial.level("voltage_V"), float) and not trial.track for trial in practice.trials)
 
 

@@ -81,8 +81,8 @@ def _with_own_tracks(trials: Sequence[Trial]) -> Iterator[Trial]:
         yield replace(trial, track=own) if own != trial.track else trial
 
 
-def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: int = 0) -> Plan | None:
-    """The plan of a practice: some trials of each cell of `practice.of`, mixed, in one set; `None` if there are none.
+def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: int = 0) -> Plan:
+    """The plan of a practice: some trials of each cell of `practice.of`, mixed, in one set; a design may have none.
 
     The levels of the other factors are drawn. A practice is of the gun: it has no instruction.
     """
@@ -101,8 +101,6 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
         _trial(design, (1, 1, place), _without(INSTRUCTION_FACTOR, content.levels), content)
         for place, content in enumerate(streams.of("practice").shuffled(drawn), start=1)
     ]
-    if not trials:
-        return None
     return Plan(
         experiment=design.design,
         participant_id=participant_id,

@@ -146,6 +146,8 @@ def may_run(study: StudyFolder, entered: Entered, *, practice: bool = False) -> 
     `PlaceError` and `JournalError` say why they may not.
     """
     _refuse(read_back_refusal(entered))
+    if practice:
+        folders.refuse_without_practice(study.setup_of(entered.experiment))
     person, problems = look_at(study, entered.participant_id)
     run = run_of(person, entered.experiment)
     if run.state == "unreadable":

@@ -151,6 +151,10 @@ class StudyFolder:
         """The experiments in the order of the study."""
         return tuple(setup.config.experiment for setup in self.setups)
 
+    def setup_of(self, experiment: str) -> Setup[DesignConfig]:
+        """The setup of one of its experiments."""
+        return next(setup for setup in self.setups if setup.config.experiment == experiment)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overview:
@@ -389,6 +393,14 @@ def _practised(where: Place) -> bool:
             if contents.finished and contents.head.participant == "person":
                 return True
     return False
+
+
+def refuse_without_practice(setup: Setup[DesignConfig]) -> None:
+    """`PlaceError` if a design has no practice."""
+    if not setup.config.practice.repetitions:
+        raise PlaceError(
+            f"{setup.source}: there is no practice (repetitions in the table [practice]); begin the run itself"
+        )
 
 
 def make_results(folder: Path) -> None:

@@ -144,9 +144,13 @@ class ParticipantSide:
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
         """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
         self._live, self._tell, self.planned = live, tell, len(live.plan.trials)
-        self._tell(ParticipantSeen())
+        self._see()
         self._link.listen(self._heard, self._gone)
         return self._noise_told()
+
+    def _see(self, *, focused: bool = False, failure: str = "") -> None:
+        noise_off = self._noise is not None and not self._noise.on
+        self._tell(ParticipantSeen(focused=focused, failure=failure, noise_off=noise_off))
 
     def _noise_told(self) -> str:
         """What the record is to say of the noise, if anything; the console hears that it stays off."""
@@ -297,13 +301,17 @@ class ParticipantSide:
         if self._live is not None:
             self._live.offer(event)
 
-    def _heard(self, word: messages.EmergencyPressed | messages.Focused | messages.KeyPressed) -> None:
-        """What comes from there without a question: the emergency stop, whose the keys are, keys in a pause."""
+    def _heard(self, word: messages.Unasked) -> None:
+        """What comes from there without a question: emergency stop, whose the keys are, keys in a pause, no noise."""
         match word:
             case messages.EmergencyPressed():
                 self._offer(events.EmergencyStop(by="participant"))
             case messages.Focused():
-                self._tell(ParticipantSeen(focused=word.on))
+                self._see(focused=word.on)
+            case messages.NoiseEnded() if self._live is not None:
+                self._noise = messages.NoiseIs(on=False, message=word.message)
+                self._see()
+                self._live.remark(Noted(trial=None, text=self._noise_told()))
             case messages.KeyPressed() if self._live is not None:
                 position, now_s = self._live.position, self._live.clock.now()
                 said = self._said(position)
@@ -314,7 +322,7 @@ class ParticipantSide:
     def _gone(self, cause: str) -> None:
         """The program has ended, and was not told to."""
         if not self._closed:
-            self._tell(ParticipantSeen(failure=cause))
+            self._see(failure=cause)
             self._offer(events.ParticipantLost(cause=cause))
 
     @property
@@ -339,7 +347,7 @@ class ParticipantSide:
             return
         with self._lock:
             self._link, self._shows, self._starting = link, "", False
-        self._tell(ParticipantSeen())
+        self._see()
         link.listen(self._heard, self._gone)
         self._tell(Trouble(text=phrase("The participant's screen is there again."), mood="good"))
         self._offer(events.ParticipantBack())

@@ -187,7 +187,15 @@ def gun_text(seen: Seen) -> tuple[str, str]:
 
 
 def focus_text(seen: Seen, *, here: bool) -> tuple[str, str]:
-    """Whose the keys are, and a word that chooses the colour; empty where nothing else could have them."""
+    """Whose the keys are, and that noise does not play that should; and a word that chooses the colour."""
+    text, mood = _keys_text(seen, here=here)
+    if seen.participant is None or not seen.participant.noise_off:
+        return text, mood
+    return phrase("{keys}\nMasking noise: OFF", keys=text), "bad"
+
+
+def _keys_text(seen: Seen, *, here: bool) -> tuple[str, str]:
+    """Empty where nothing else could have them."""
     if here:
         return (phrase("Keys: this window"), "good") if seen.participant is not None else ("", "good")
     if seen.participant is not None and seen.participant.focused:

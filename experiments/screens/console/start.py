@@ -294,7 +294,7 @@ class StartWindow(QtWidgets.QWidget):
             self.close()
 
     def _setup(self) -> Setup[DesignConfig]:
-        return next(s for s in self._study.setups if s.config.experiment == self.form.experiment.currentText())
+        return self._study.setup_of(self.form.experiment.currentText())
 
     # excluding
 

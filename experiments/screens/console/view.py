@@ -68,10 +68,11 @@ class GunSeen(Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantSeen(Message):
-    """Whether the participant's screen has the keys, or why it is gone."""
+    """Whether the participant's screen has the keys, or why it is gone; whether noise that is wanted does not play."""
 
     focused: bool = False
     failure: str = ""
+    noise_off: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

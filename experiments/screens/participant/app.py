@@ -70,6 +70,8 @@ class Wire:
 
 _STEP_S = 0.004
 """How long the program rests between two looks at words, mouse and keys."""
+_LISTEN_S = 1.0
+"""And between two looks whether the noise plays still."""
 
 
 def run_program(look: messages.Look, heard: BinaryIO, said: BinaryIO) -> int:
@@ -106,6 +108,7 @@ class App:
         self._keys = KeyPresses(stage.toolkit)
         self._standstills = Standstills(stage.toolkit.now)
         self._noise = MaskingNoise()
+        self._listened_s = 0.0
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
         self._drafts: Drafts = {}
@@ -132,6 +135,7 @@ class App:
                 self._wire.say(self._stage.unasked.popleft())
             self._keys.poll()
             self._tell_keys()
+            self._tell_noise()
             self._answer()
             time.sleep(_STEP_S)
         self._noise.stop()
@@ -145,6 +149,14 @@ class App:
             self._told_s = math.nextafter(press.pressed_s, math.inf)
             if press.name in self._told:
                 self._wire.say(messages.KeyPressed(name=press.name))
+
+    def _tell_noise(self) -> None:
+        """Say, within a second, that the noise has ended."""
+        now_s = self._stage.toolkit.now()
+        if now_s - self._listened_s >= _LISTEN_S:
+            self._listened_s = now_s
+            if (ended := self._noise.has_ended()) is not None:
+                self._wire.say(ended)
 
     def _obey(self, word: messages.ToParticipant) -> None:
         self._told = word.tell if isinstance(word, messages.Show) else ()

@@ -202,6 +202,14 @@ class KeyPressed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseEnded:
+    """The noise played and plays no more; the message says why and what to do."""
+
+    message: str
+    kind: Literal["noise-ended"] = "noise-ended"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScreenFailed:
     """The participant's screen ends, and why."""
 
@@ -210,7 +218,7 @@ class ScreenFailed:
 
 
 ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
-Unasked = EmergencyPressed | Focused | KeyPressed
+Unasked = EmergencyPressed | Focused | KeyPressed | NoiseEnded
 """What the participant's screen says without being asked."""
 FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | ChoiceGiven | NoiseIs | Unasked | ScreenFailed
 

@@ -30,6 +30,13 @@ class MaskingNoise:
             return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
         return messages.NoiseIs(on=True, message="", ask=asked.ask)
 
+    def has_ended(self) -> messages.NoiseEnded | None:
+        """What is to be said where it was on and ended by itself: a sound device that is gone ends its stream."""
+        if self._sound is None or self._sound.stream._sdStream.active:
+            return None
+        self.stop()
+        return messages.NoiseEnded(message=f"Masking noise has ended: its sound device is gone. {_REMEDY}")
+
     def stop(self) -> None:
         """Silence."""
         if self._sound is not None:
@@ -44,7 +51,10 @@ def _playing(level: float) -> Any:
 
     prefs.hardware["audioLib"] = ["sounddevice"]
     from psychopy import sound  # noqa: PLC0415
+    from sounddevice import query_devices  # noqa: PLC0415
 
+    if not any(device["max_output_channels"] for device in query_devices()):
+        raise RuntimeError("the system lists none")  # PsychoPy takes the first of none
     mono = np.random.default_rng(_SEED).uniform(-1, 1, int(_LOOP_S * _RATE_Hz))
     noise = sound.Sound(
         np.column_stack([mono, mono]), sampleRate=_RATE_Hz, stereo=True, volume=level, loops=-1, hamming=False
@@ -53,9 +63,9 @@ def _playing(level: float) -> Any:
     return noise
 
 
+_REMEDY = "Connect headphones, see that the system lists them, then stop this run and resume it."
+
+
 def _why_not(error: BaseException) -> str:
     reason = " ".join(str(error).split()) or type(error).__name__
-    return (
-        f"Masking noise stays off: no sound device plays it ({type(error).__name__}: {reason}). "
-        "Connect headphones, see that the system lists them, then stop this run and resume it."
-    )
+    return f"Masking noise stays off: no sound device plays it ({reason}). {_REMEDY}"
