@@ -261,7 +261,7 @@ FAULTS: dict[str, tuple[Callable[[str], str], str]] = {
     "level": (lambda t: t.replace('up = "forward"', 'up = "left"'), "values.response.up = 'left'"),
     "unit": (lambda t: t.replace('unit = "s"', 'unit = "min"'), "response_time.unit = 'min'"),
     "no unit": (lambda t: t.replace('[response_time]\nunit = "s"', ""), "response_time.unit is missing"),
-    "decimal": (lambda t: t.replace('decimal = "."', 'decimal = ","'), "is also text.delimiter"),
+    "decimal": (lambda t: t.replace('decimal = "."', 'decimal = ","'), "is also the delimiter"),
     "both": (lambda t: t.replace("# file_name", "file_name"), "either `column` or `file_name`"),
     "pattern": (lambda t: t.replace('column = "participant"', 'file_name = "P.."'), "has 0 groups"),
     "pattern of a name": (lambda t: t.replace('column = "participant"', 'file_name = "P(..)"\npattern = "P(..)"'),

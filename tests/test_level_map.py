@@ -132,6 +132,7 @@ def test_what_a_map_does_not_fit_is_said_with_file_line_and_column(lab: Path, ol
         ("answers = 2", "", "answers is missing: of right answers say among how many"),
         ('share = "right"', 'share = "yes"', 'answers is of share = "right"'),
         ('name = "voltage_V"', 'name = "voltage V"', "name = 'voltage V': must be a letter and up to 31 letters"),
+        ('delimiter = ";"', 'delimiter = ","', "decimal = ',' is also the delimiter"),
     ],
 )
 def test_a_map_that_is_none_is_refused(lab: Path, old: str, new: str, words: str) -> None:

@@ -29,10 +29,10 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_LOG, BadLogError
-from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
+from analysis.logs.mapped_people import ShortText, check_person, code_in
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
-from analysis.logs.separated import SeparatedLine, TextFormat, separated_lines
+from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from analysis.logs.texts import CsvRecord
 from device.words import first_few
 from experiments.config.door import Model, once
@@ -94,24 +94,6 @@ def scale_of_others(ends: tuple[float, float]) -> str:
     return f"Ratings {came}; the logs are another program's and tell neither the question nor what the ends mean."
 
 
-class Skip(Model):
-    """Rows to leave out."""
-
-    column: ShortText
-    values: tuple[str, ...] = ()
-    empty: bool = False
-
-    @model_validator(mode="after")
-    def _says_which(self) -> Self:
-        if not self.values and not self.empty:
-            raise ValueError("give `values`, or `empty = true`")
-        return self
-
-    def leaves_out(self, cell: str) -> bool:
-        """Is a row with this cell left out?"""
-        return cell in self.values or (self.empty and cell == tables.MISSING)
-
-
 class ValuesMapping(Model):
     """What cells mean."""
 
@@ -139,21 +121,17 @@ NOT_STATED = "not stated"
 """The gun of logs whose map names none."""
 
 
-class ColumnMap(Model):
+class ColumnMap(LogMap):
     """A whole map."""
 
     experiment: Literal["direction", "preference"]
-    files_end_with: Annotated[tuple[ShortText, ...], Field(min_length=1)] = (".csv",)
     gun: ShortText = NOT_STATED
     response_source: Literal["participant", "experimenter", "synthetic"] = "participant"
-    text: TextFormat = TextFormat()
-    participant: ParticipantMapping
     columns: ColumnNames
     values: ValuesMapping = ValuesMapping()
     method: MethodsMapping = MethodsMapping()
     response_time: ResponseTimeMapping | None = None
     rating: ScaleMapping | None = None
-    skip: tuple[Skip, ...] = ()
 
     @property
     def rated_from(self) -> tuple[float, float] | None:
@@ -161,12 +139,6 @@ class ColumnMap(Model):
         if self.experiment != "preference":
             return None
         return (0.0, 10.0) if self.rating is None else (self.rating.scale_min, self.rating.scale_max)
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Every column of a file that the map names."""
-        named = [*self.columns.model_dump(exclude_none=True).values(), *(skip.column for skip in self.skip)]
-        return tuple(filter(None, [self.participant.column, *named]))
 
     @model_validator(mode="after")
     def _measures_are_named(self) -> Self:
@@ -188,12 +160,6 @@ class ColumnMap(Model):
                     raise ValueError(f"{answer} and {role} are both the column {name!r} {rule}")
         return self
 
-    @model_validator(mode="after")
-    def _decimal_mark_does_not_part_cells(self) -> Self:
-        if self.text.decimal == self.text.delimiter:
-            raise ValueError(f"text.decimal = {self.text.decimal!r} is also text.delimiter (rule: they differ)")
-        return self
-
 
 _ANSWERS = ("response", "rating", "response_time", "correct")
 """What a participant did, or another program said of it: no such column can say anything else."""
@@ -212,8 +178,7 @@ class MappedLog:
 
 def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[MappedLog]:
     """The logs in a file, one a participant and study; `BadLogError` if it is no such table."""
-    every = list(separated_lines(content, mapping.text, mapping.named))
-    lines = [line for line in every if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)]
+    lines = kept_lines(content, mapping)
     people: dict[tuple[str | None, str], list[SeparatedLine]] = {}
     nobodys: list[BadLogError] = []
     for line in lines:
@@ -222,8 +187,6 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
             people.setdefault((study, _code(line, file_name, mapping)), []).append(line)
         except BadLogError as bad:
             nobodys.append(bad)
-    if not lines:
-        raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
     if not people:
         raise nobodys[0]
     found = [

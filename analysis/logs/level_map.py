@@ -16,10 +16,9 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from analysis.logs.cell_rules import number_in
-from analysis.logs.column_map import Skip
 from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
-from analysis.logs.mapped_people import ParticipantMapping, ShortText, check_person, code_in
-from analysis.logs.separated import SeparatedLine, TextFormat, separated_lines
+from analysis.logs.mapped_people import ShortText, check_person, code_in
+from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from experiments.config.door import Model
 from experiments.design.language import ColumnName
 from experiments.record import tables
@@ -43,7 +42,7 @@ class LevelValues(Model):
     condition: dict[str, str] = Field(default_factory=dict)
 
 
-class LevelMap(Model):
+class LevelMap(LogMap):
     """A whole map. `name` is the level's, with its unit; `answers`: of right ones, among how many who guesses chooses.
 
     `falling`: successes become fewer the higher the level.
@@ -53,12 +52,8 @@ class LevelMap(Model):
     share: Literal["right", "yes"]
     answers: Annotated[int, Field(ge=2, le=100)] | None = None
     falling: bool = False
-    files_end_with: Annotated[tuple[ShortText, ...], Field(min_length=1)] = (".csv",)
-    text: TextFormat = TextFormat()
-    participant: ParticipantMapping
     columns: LevelColumns
     values: LevelValues = LevelValues()
-    skip: tuple[Skip, ...] = ()
 
     @model_validator(mode="after")
     def _chance_is_known_of_right_answers(self) -> Self:
@@ -67,12 +62,6 @@ class LevelMap(Model):
         if self.share == "yes" and self.answers is not None:
             raise ValueError('answers is of share = "right": of yes the guess rate is fitted; remove it')
         return self
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Every column of a file that the map names."""
-        named = [*self.columns.model_dump(exclude_none=True).values(), *(skip.column for skip in self.skip)]
-        return tuple(filter(None, [self.participant.column, *named]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -92,23 +81,12 @@ def read_levels(paths: Sequence[Path], mapping: LevelMap) -> MappedLevels:
         try:
             content = read_content(str(path))
             check_length(content, LONGEST_MAPPED)
-            rows += _rows(content, path.name, mapping)
+            rows += _answered(kept_lines(content, mapping), path.name, mapping)
             files.append(path)
         except BadLogError as bad:
             problems.append(bad.of(path, "", "", ""))
     names = ["participant_id", "level", "success", "condition"]
     return MappedLevels(table=pd.DataFrame(rows, columns=names), files=tuple(files), problems=tuple(problems))
-
-
-def _rows(content: bytes, file_name: str, mapping: LevelMap) -> list[dict[str, object]]:
-    lines = [
-        line
-        for line in separated_lines(content, mapping.text, mapping.named)
-        if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)
-    ]
-    if not lines:
-        raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
-    return list(_answered(lines, file_name, mapping))
 
 
 def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap) -> Iterator[dict[str, object]]:

@@ -1,4 +1,4 @@
-"""Separated text of other programs, read line by line: how it is written, and the cells of named columns."""
+"""Separated text of other programs, read line by line: what every map says of it, and the cells of named columns."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
 
 from analysis.logs.files import BadLogError
+from analysis.logs.mapped_people import ParticipantMapping, ShortText
 from experiments.config.door import Model
 from experiments.record import tables
 
@@ -21,6 +24,46 @@ class TextFormat(Model):
     decimal: Literal[".", ","] = "."
     missing: tuple[str, ...] = ("", "None", "NA", "nan")
 
+    @model_validator(mode="after")
+    def _decimal_mark_does_not_part_cells(self) -> Self:
+        if self.decimal == self.delimiter:
+            raise ValueError(f"decimal = {self.decimal!r} is also the delimiter (rule: they differ)")
+        return self
+
+
+class Skip(Model):
+    """Rows to leave out."""
+
+    column: ShortText
+    values: tuple[str, ...] = ()
+    empty: bool = False
+
+    @model_validator(mode="after")
+    def _says_which(self) -> Self:
+        if not self.values and not self.empty:
+            raise ValueError("give `values`, or `empty = true`")
+        return self
+
+    def leaves_out(self, cell: str) -> bool:
+        """Is a row with this cell left out?"""
+        return cell in self.values or (self.empty and cell == tables.MISSING)
+
+
+class LogMap(Model):
+    """What every map says: which files and how they are written, whose rows, the columns by name, rows to leave out."""
+
+    files_end_with: Annotated[tuple[ShortText, ...], Field(min_length=1)] = (".csv",)
+    text: TextFormat = TextFormat()
+    participant: ParticipantMapping
+    columns: Model
+    skip: tuple[Skip, ...] = ()
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Every column of a file that the map names."""
+        named = [*self.columns.model_dump(exclude_none=True).values(), *(skip.column for skip in self.skip)]
+        return tuple(filter(None, [self.participant.column, *named]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeparatedLine:
@@ -30,7 +73,16 @@ class SeparatedLine:
     cells: dict[str, str]
 
 
-def separated_lines(content: bytes, text: TextFormat, named: Sequence[str]) -> Iterator[SeparatedLine]:
+def kept_lines(content: bytes, mapping: LogMap) -> list[SeparatedLine]:
+    """The rows of a file that `skip` does not leave out. `BadLogError`: it has none, or is no such text."""
+    every = _separated_lines(content, mapping.text, mapping.named)
+    kept = [line for line in every if not any(skip.leaves_out(line.cells[skip.column]) for skip in mapping.skip)]
+    if not kept:
+        raise BadLogError("has no row left to read (rule: at least one that `skip` does not leave out)")
+    return kept
+
+
+def _separated_lines(content: bytes, text: TextFormat, named: Sequence[str]) -> Iterator[SeparatedLine]:
     """The rows of a file that has all `named` columns. `BadLogError`: it has not, or is no such text."""
     try:
         decoded = content.decode(text.encoding)
