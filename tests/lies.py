@@ -907,6 +907,7 @@ _TAIL = """
 ## What is taken for a copy
 
 - A table of our own with onsets is a copy of another if both are the same byte for byte: the folder was copied.
+- A table beside a redacted journal, as in an archive, is a copy where a journal is read whose last line it names.
 - Rows of trials are copies of others if they are the same in all that was asked, in the answers and in the response
   times to the ms, and would be so by chance less than once in 10^9. A log says by itself how rare its rows are: each
   counts −ln(share of its answer among those to the same question) − ln(share of its time among its times), and the sum

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from analysis.archive.archive_export import ArchiveRequest, export_archive
 from analysis.logs.exclusions import IN_NO_TEST, LeftOut
 from analysis.logs.journals import gone
 from analysis.logs.reading import read_logs
@@ -263,6 +264,54 @@ def test_a_copy_of_a_folder_leaves_out_nobody_and_the_original_stays(tmp_path: P
     counts = statistics.participation.experiments["preference"]
     assert (counts.analysed, counts.left_out, counts.not_done) == (2, 0, 0)
     assert statistics.participation.absent == ()
+
+
+def test_the_archive_of_a_study_beside_it_is_nobody_else(quick_configs: Path, tmp_path: Path) -> None:
+    results, archive = tmp_path / "study" / "results", tmp_path / "archive"
+    for code in ("P01", "P02", "P03"):
+        for config in ("preference.toml", "realism.toml"):
+            ran(results, code, str(quick_configs / config))
+    alone = read_logs([results])
+    export_archive(ArchiveRequest(folder=tmp_path / "study", out=archive, include_synthetic=True))
+    export_archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / "again", include_synthetic=True))
+    register.append(results, register.entry("excluded", "P03", reason="asked to be"), VirtualClock())
+    for paths in ([tmp_path], [archive, results], [*sorted(archive.rglob("sub-*.csv")), *alone.files]):
+        logs = read_logs(paths)
+        assert {file.parent.parent for file in logs.files} == {results}
+        found = with_everybody(summarize(logs), logs)
+        assert found.preference is not None
+        assert found.preference.participants.codes == ("P01", "P02")
+        assert {one.participant for one in found.excluded} == {"P03", ""}
+        said = [one.message for one in logs.problems if archive in one.file.parents]
+        assert len(said) == 6
+        original = "study/results/sub-P01/sub-P01_task-preference_journal.jsonl"
+        assert f"is a redacted copy of the run in {original} (rule: a run counts once); read one of both" in said
+        assert found.participation is not None
+        assert {one.participant for one in found.participation.absent} == {"P03"}
+
+
+def test_of_two_archives_of_a_study_each_run_counts_once(quick_configs: Path, tmp_path: Path) -> None:
+    people = quick_configs / "synthetic" / "preference.toml"
+    people.write_text(people.read_text().replace('law = "words"', 'law = "words"\ntexts = ["like a mule"]'))
+    ran(tmp_path / "study" / "results", "P01", str(quick_configs / "preference.toml"))
+    for name, free_text in (("open", True), ("hidden", False)):
+        export_archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / name, free_text=free_text))
+    said = table(tmp_path / "open" / "results", "preference")
+    assert said.read_bytes() != table(tmp_path / "hidden" / "results", "preference").read_bytes()
+    logs = read_logs([tmp_path / "open", tmp_path / "hidden"])
+    assert logs.files == (said,)
+
+
+def test_a_run_that_went_on_since_it_was_archived_counts_once(tmp_path: Path) -> None:
+    results = tmp_path / "study" / "results"
+    path = broken_off(results, "P01", 40)
+    whole = path.read_bytes()
+    rebuild_table(path)
+    export_archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / "archive"))
+    table(results, "preference").unlink()
+    ran(results, again="resume")
+    assert path.read_bytes().startswith(whole)
+    assert read_logs([tmp_path]).files == (table(results, "preference"),)
 
 
 def test_what_is_said_of_logs_that_were_used_stands_in_the_statistics(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from analysis.logs.files import (
     results_above,
     seen_from,
 )
-from analysis.logs.journals import Beside, RunFile
+from analysis.logs.journals import Beside, RunFile, holds_line, journal_of
 from analysis.logs.kinds import IN_REGISTER, kept_out, kinds_of
 from analysis.logs.rules import Log
 from analysis.logs.setups import SetupOfLog, changed_setups
@@ -109,6 +109,8 @@ class LogsSoFar:
     """Folder and code of each good log of our own, and whether it has a journal."""
     setups: dict[int, str] = field(default_factory=dict)
     """The hash of the setup of each good log that has a journal."""
+    originals: dict[int, str] = field(default_factory=dict)
+    """Of each good log whose journal is redacted, the hash of the last line of the original."""
     told: dict[str, list[ToldRows]] = field(default_factory=dict)
     """What the rows of logs tell, by experiment."""
 
@@ -148,6 +150,8 @@ class LogsSoFar:
         self.proven[number] = one.study, log.code, beside is not None
         if beside is not None:
             self.setups[number] = beside.setup
+            if beside.original:
+                self.originals[number] = beside.original
             if beside.said:
                 self.remarks.append(BadLogError(beside.said).of(one.file, log.code, log.experiment, one.study))
 
@@ -208,8 +212,9 @@ class LogsSoFar:
             if first != one.path and FULL_ONSET.search(one.content):
                 self.same.setdefault(first, {first}).add(one.path)
 
-    def leave_copies(self) -> None:
-        """Leave out the logs that hold what others hold."""
+    def leave_copies(self, runs: Iterable[RunFile]) -> None:
+        """Leave out the logs that hold what others hold; `runs` are those whose journals were found."""
+        self._leave_redacted(runs)
         self._leave_same()
         proven = {number for number, (_, _, has_journal) in self.proven.items() if has_journal}
 
@@ -222,21 +227,50 @@ class LogsSoFar:
                 self._leave(number, said)
 
     def _leave_same(self) -> None:
-        """Of files that are alike byte for byte the one named first stays, of these the one in fewest folders.
-
-        The copy is nobody's: whoever it is of stands in the analysis, or among those left out, by the file that stays.
-        """
+        """Of files that are alike byte for byte the one named first stays, of these the one in fewest folders."""
         stays = dict[str, str]()
         for paths in self.same.values():
-            first, *others = sorted(paths, key=lambda path: (self.given.get(path, 0), path.count(os.sep), path))
+            first, *others = sorted(paths, key=self._in_order)
             stays |= dict.fromkeys(others, first)
         for number in [*self.studies] if stays else ():
             path = self.paths[number // LOGS_A_FILE]
             if path in stays:
-                said = f"holds what {seen_from(stays[path], path)} holds, byte for byte (rule: a run counts once)"
-                self.copied.add((self.studies[number], self.codes[number], self.experiments[number]))
-                self._leave(number, f"{said}; read one of both", nobody=True)
-                self.proven.pop(number, None)
+                self._leave_copy(number, f"holds what {seen_from(stays[path], path)} holds, byte for byte")
+
+    def _leave_redacted(self, runs: Iterable[RunFile]) -> None:
+        """A log of an archive goes where the journal is that its own was made from, or another that was made from it.
+
+        The original may be of somebody who is left out: nobody comes back by a copy.
+        """
+        stays, journals = dict[str, str](), self._journals(runs) if self.originals else {}
+        redacted = ((self.paths[number // LOGS_A_FILE], number) for number in self.originals if number in self.studies)
+        for path, number in sorted(redacted, key=lambda one: self._in_order(one[0])):
+            line, others = self.originals[number], journals[self.codes[number], self.experiments[number]]
+            there = (one for one in others - {journal_of(path)} if holds_line(one, line))
+            first = min(there, key=self._in_order, default="") or stays.setdefault(line, path)
+            if first != path:
+                self._leave_copy(number, f"is a redacted copy of the run in {seen_from(first, path)}")
+
+    def _journals(self, runs: Iterable[RunFile]) -> Mapping[tuple[str, str], set[str]]:
+        """The journals that were found, and those beside logs, good or not, by code and experiment."""
+        there = [((run.participant, run.experiment), run.path) for run in runs]
+        there += [((one.participant, one.experiment), str(one.file)) for one in self.problems]
+        for number in self.studies:
+            there.append(((self.codes[number], self.experiments[number]), self.paths[number // LOGS_A_FILE]))
+        found: dict[tuple[str, str], set[str]] = {}
+        for key, path in there:
+            found.setdefault(key, set()).add(journal_of(path))
+        return found
+
+    def _in_order(self, path: str) -> tuple[int, int, str]:
+        """Of copies the first in this order stays."""
+        return self.given.get(path, 0), path.count(os.sep), path
+
+    def _leave_copy(self, number: int, said: str) -> None:
+        """Leave out a copy, which is nobody's: whoever it is of stands in the analysis, or among those left out."""
+        self.copied.add((self.studies[number], self.codes[number], self.experiments[number]))
+        self._leave(number, f"{said} (rule: a run counts once); read one of both", nobody=True)
+        self.proven.pop(number, None)
 
     def _seen_from(self, number: int, other: int) -> str:
         """What the person of a log is called in what is said of another."""

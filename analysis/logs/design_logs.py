@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
 from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name
-from analysis.logs.journals import compared_with, journal_of
+from analysis.logs.journals import Beside, beside, journal_of
 from analysis.logs.names import gun_labels
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
@@ -39,14 +39,13 @@ class DesignLogs:
 class DesignLog:
     """One log that keeps every rule; `key` is the same for logs that can be analysed together.
 
-    `journal` is what there is to say of the journal beside it, `setup` the hash of its setup.
+    `journal` is the one beside it.
     """
 
     code: str
     design: DesignConfig
     key: str
-    journal: str
-    setup: str
+    journal: Beside
     rows: tuple[Mapping[str, object], ...]
     gun_labels: Mapping[str, str]
 
@@ -67,14 +66,13 @@ def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
     _check_plan(design, head.plan, rows)
     _check_times(design, rows)
     _check_onsets(rows)
-    said = compared_with(data, path, content)
+    journal_beside = beside(data, path, content)
     return DesignLog(
         code=code,
         design=design,
         key=_key(design),
         rows=rows,
-        journal=said,
-        setup=head.setup_sha256,
+        journal=journal_beside,
         gun_labels=gun_labels(head),
     )
 

@@ -107,10 +107,14 @@ def _refuse_other(run: RunFile, contents: Contents) -> None:
 
 
 class Beside(NamedTuple):
-    """The journal beside a table: what there is to say of it, empty if all is well, and the hash of its setup."""
+    """The journal beside a table: what there is to say of it, empty if all is well, and the hash of its setup.
+
+    `original`: of a redacted one the SHA-256 of the last line of the journal that it was made from.
+    """
 
     said: str
-    setup: str
+    setup: str = ""
+    original: str = ""
 
 
 def compared(path: str, content: bytes) -> Beside | None:
@@ -121,17 +125,32 @@ def compared(path: str, content: bytes) -> Beside | None:
     try:
         data = storage.read_whole(where)
     except OSError as error:
-        return Beside(f"its journal cannot be read ({error.strerror}), so nothing proves the table", "")
-    return Beside(compared_with(data, path, content), setup_hash(data))
+        return Beside(f"its journal cannot be read ({error.strerror}), so nothing proves the table")
+    return beside(data, path, content)
+
+
+def beside(data: bytes, path: str, content: bytes) -> Beside:
+    """The journal of a table, by its bytes. Raises as `compared`."""
+    said = compared_with(data, path, content)
+    return Beside(said, setup=_in_head(_SETUP, data), original=_in_head(_ORIGINAL, data))
 
 
 _SETUP = re.compile(rb'"setup_sha256":"([0-9a-f]{64})"')
+_ORIGINAL = re.compile(rb'"redacted_from":\{"format":1,"last_line_sha256":"([0-9a-f]{64})"')
 
 
-def setup_hash(data: bytes) -> str:
-    """The hash of the setup in the first line of a journal; empty if there is none."""
-    found = _SETUP.search(data, 0, data.find(b"\n"))
+def _in_head(hash_there: re.Pattern[bytes], data: bytes) -> str:
+    """A hash in the first line of a journal; empty if there is none."""
+    found = hash_there.search(data, 0, data.find(b"\n"))
     return found[1].decode() if found else ""
+
+
+def holds_line(path: str, line_sha256: str) -> bool:
+    """Whether a journal has a line of this hash: it, or as it was before it went on, ended with that."""
+    with suppress(OSError):
+        lines = storage.read_whole(path).split(b"\n")
+        return any(hashlib.sha256(line).hexdigest() == line_sha256 for line in reversed(lines))
+    return False
 
 
 def compared_with(data: bytes, path: str, content: bytes) -> str:

@@ -34,7 +34,6 @@ from analysis.logs.files import (
 )
 from analysis.logs.journals import (
     BegunRun,
-    Beside,
     RunFile,
     all_gone,
     compared,
@@ -140,7 +139,7 @@ def read_logs(
     for waiting, batch in _checked_batches(_batches(found, track, made), mapping):
         reading.add(waiting, batch)
     designs = _designed(reading, {path: every[path] for path in every if path not in found}, track, len(found), made)
-    reading.leave_copies()
+    reading.leave_copies(runs)
     reading.remarks += gone(reading.proven.values())
     kinds = kinds_there(reading.kinds[number] for number in reading.studies)
     if not include_synthetic:
@@ -224,7 +223,7 @@ def _designed(
             of_design = Log(code=log.code, experiment=log.design.design)
             reading.kinds[number * LOGS_A_FILE] = kind_of_design(log)
             reading.admit(number * LOGS_A_FILE, waiting, of_design, study)
-            reading.note(number * LOGS_A_FILE, waiting, of_design, Beside(log.journal, log.setup))
+            reading.note(number * LOGS_A_FILE, waiting, of_design, log.journal)
             reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
             logs[number * LOGS_A_FILE] = log
             if told := told_by_design(number * LOGS_A_FILE, log.design, log.rows):
