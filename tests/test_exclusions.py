@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import gcd
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import recoil
@@ -87,6 +90,23 @@ accuracy = [{method = "vibration", min_share = 0.51}, {method = "ramp", min_shar
     assert found["P02"] == ("min_kept_share", "58 of 60 trials kept (rule: at least 0.98 of them)")
     assert found["P03"] == ("accuracy", "0.5 correct with vibration (rule: at least 0.51)")
     assert effect.warnings == ("the rules ask for accuracy with ramp, which no log with right answers has",)
+
+
+@pytest.mark.parametrize("percent", range(1, 101))
+def test_who_keeps_just_the_share_that_the_rule_asks_for_stays(percent: int, tmp_path: Path) -> None:
+    """Of so many trials as make it a whole number of them; who has one less kept goes."""
+    write_study(tmp_path, participants=1)
+    logs = read_logs([tmp_path])
+    step = 100 // gcd(percent, 100)
+    kept = {f"A{n}": (n * percent // 100, n) for n in range(step, 201, step)}
+    kept |= {code.replace("A", "B"): (some - 1, n) for code, (some, n) in kept.items()}
+    people = np.repeat([*kept], [n for _, n in kept.values()])
+    flags = [flag for some, n in kept.values() for flag in [""] * some + ["noise"] * (n - some)]
+    row = logs.ratings.iloc[np.zeros(len(people), dtype=int)].reset_index(drop=True)
+    table = row.assign(participant_id=pd.Categorical(people), flags=flags)
+    rules = _rules(tmp_path, f'trials.drop_flags = ["noise"]\nparticipants.min_kept_share = {percent / 100}')
+    effect = apply_rules(replace(logs, ratings=table), rules)
+    assert {one.participant for one in effect.excluded} == {code for code in kept if code.startswith("B")}
 
 
 def test_listed_participants_are_left_out_of_both_experiments_and_unknown_ones_are_named(tmp_path: Path) -> None:

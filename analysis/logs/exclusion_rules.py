@@ -263,7 +263,7 @@ def _too_few(table: pd.DataFrame, kept: pd.DataFrame, least: float | None) -> It
     left = remaining.reindex(recorded.index, fill_value=0)
     rule = f"at least {least:g} of them" if least else "at least one"
     for code, count, of in zip(recorded.index, left.to_list(), recorded.to_list(), strict=True):
-        if count == 0 or count < (least or 0.0) * of:
+        if count == 0 or count / of < (least or 0.0):  # rounded as the share itself is
             yield str(code), "min_kept_share", f"{count} of {of} trials kept (rule: {rule})"
 
 
