@@ -339,6 +339,24 @@ def test_other_rules_and_tests_than_were_frozen_are_told(begun: Path, tmp_path: 
     assert [one.what for one in none] == ["--rules was not given", "a frozen test that was not made (--requests)"]
 
 
+def test_why_the_rules_leave_somebody_out_is_not_frozen_and_no_deviation(study: Path) -> None:
+    person = '[[excluded]]\ncode = "P02"\nreason = "a seizure"\n'
+    (study / "rules.toml").write_text(RULES + person)
+    done = freeze(study, "", RealClock())
+    assert "seizure" not in done.file.read_text() + done.page.read_text()
+    assert "P02 is left out, for a reason that is not published here." in done.page.read_text()
+    (study / "rules.toml").write_text(RULES + person.replace("seizure", "fit"))
+    assert freeze_status(study).changes == ()
+    do(study, "P01")
+    assert of_kind(told(study), "analysis") == []
+    (study / "rules.toml").write_text(RULES + person.replace("P02", "P03"))
+    assert [(one.key, one.frozen, one.now) for one in freeze_status(study).changes] == [
+        ("excluded.1.code", "P02", "P03")
+    ]
+    again = freeze(study, "a slip", RealClock())
+    assert "seizure" not in again.file.read_text() + again.page.read_text()
+
+
 def test_frozen_tests_are_made_unless_a_file_asks_for_others(study: Path) -> None:
     of_ratings = REQUEST.replace("direction", "preference")
     (study / "requests.toml").write_text(of_ratings + REQUEST)

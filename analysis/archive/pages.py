@@ -75,7 +75,8 @@ _HIDDEN = """Participants stand under their codes. In the journals and all that 
 - ages above 89 are given as 89; the study's register with its reasons for exclusions is not here.
 
 Designs and their texts, flags that the experimenter set on trials, seeds, versions and the gun's serial number are as
-they were. So are preregistrations, with their dates, the reasons of amendments and the codes of who had begun by then.
+they were. So are preregistrations, with their dates, the reasons of amendments and the codes of who had begun by then;
+why rules leave somebody out is never frozen.
 """
 _NO_WORDS = """\
 what people wrote (descriptions, notes, reasons) is `[redacted]`, as it might say who someone is; what was

@@ -129,7 +129,7 @@ def _rules(rules: Rules) -> Iterator[str]:
     for accuracy in rules.accuracy:
         yield f"Who is right in fewer than {accuracy.min_share:g} of the trials with {accuracy.method} is left out."
     for listed in rules.excluded:
-        yield f"{listed.code} is left out: {listed.reason}."
+        yield f"{listed.code} is left out, for a reason that is not published here."
 
 
 def _trial_rules(trials: TrialRules) -> Iterator[str]:

@@ -23,6 +23,7 @@ from experiments.study.preregistration import (
     FileValues,
     FreezeStatus,
     Preregistration,
+    as_frozen,
     changed_keys,
     changes_of_run,
     read_chain,
@@ -320,7 +321,7 @@ def _file(last: Preregistration, option: str, name: str | None, path: Path | Non
             yield Deviation(kind="analysis", what=f"{option} was not given", frozen=name)
         return
     frozen: FileValues = {} if name is None else last.files.get(name, {})
-    for change in changed_keys(path.name, frozen, read_toml(path)):
+    for change in changed_keys(path.name, frozen, as_frozen(path)):
         what = f"{option} {path.name}: {change.key}"
         yield Deviation(kind="analysis", what=what, frozen=change.frozen, instead=change.now)
 

@@ -121,8 +121,24 @@ def files_now(source: Path, study: StudyConfig, setups: Sequence[Setup[DesignCon
     return {
         STUDY_FILE: study.model_dump(mode="json"),
         **{file: values for setup in setups for file, values in _files_of(source.parent, setup).items()},
-        **{name: read_toml(path) for name in named if (path := source.parent / name).exists()},
+        **{name: as_frozen(path) for name in named if (path := source.parent / name).exists()},
     }
+
+
+def as_frozen(path: Path) -> FileValues:
+    """The values of a file of rules, tests, codes or published numbers, without why people are excluded by code.
+
+    What is frozen is published, and its hash lets nothing be taken out of it later.
+    """
+    values = read_toml(path)
+    listed = values.get("excluded")
+    if isinstance(listed, list):
+        values["excluded"] = [_without_reason(one) for one in listed]
+    return values
+
+
+def _without_reason(entry: JsonValue) -> JsonValue:
+    return {key: value for key, value in entry.items() if key != "reason"} if isinstance(entry, dict) else entry
 
 
 def _files_of(folder: Path, setup: Setup[DesignConfig]) -> Files:
