@@ -25,6 +25,7 @@ from analysis.summary.sections.preregistration import deviations_sections
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.door import ConfigError
 from experiments.load import load_setup
+from experiments.rebuild import rebuild
 from experiments.record.journal import head
 from experiments.run import run
 from experiments.run_request import RunRequest
@@ -125,6 +126,24 @@ def told(folder: Path, **used: object) -> StudyDeviations:
     found, _ = deviations(read_logs([folder / "results"]), replace(files, **used))
     assert len(found) == 1
     return found[0]
+
+
+def of_preference_alone(study: Path, participants: int) -> Path:
+    """The study frozen with one experiment and so many people."""
+    edited(study, "study.toml", "participants", "14", participants)
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(text.replace('["direction.toml", "preference.toml"]', '["preference.toml"]'))
+    (study / "requests.toml").write_text(REQUEST.replace("direction", "preference"))
+    freeze(study, "", RealClock())
+    return study
+
+
+def broken_off(path: Path) -> Path:
+    """A journal whose run was stopped in the middle, without its table."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[: len(lines) // 2]))
+    path.with_name(path.name.replace("journal.jsonl", "ratings.csv")).unlink()
+    return path
 
 
 def of_kind(found: StudyDeviations, kind: str) -> list[Deviation]:
@@ -304,16 +323,25 @@ def test_runs_before_the_freeze_and_the_people_are_told(study: Path) -> None:
 
 
 def test_who_came_beyond_the_planned_number_is_named_and_all_as_planned_is_no_deviation(study: Path) -> None:
-    edited(study, "study.toml", "participants", "14", 1)
-    text = (study / "study.toml").read_text()
-    (study / "study.toml").write_text(text.replace('["direction.toml", "preference.toml"]', '["preference.toml"]'))
-    (study / "requests.toml").write_text(REQUEST.replace("direction", "preference"))
-    freeze(study, "", RealClock())
+    of_preference_alone(study, 1)
     do(study, "P01")
     assert "No deviation." in report(told(study))
     do(study, "P02")
     (beyond,) = told(study).deviations
     assert (beyond.frozen, beyond.instead, beyond.who) == (1, 2, ("P02",))
+
+
+def test_who_broke_off_has_not_finished_with_a_table_or_without(study: Path) -> None:
+    of_preference_alone(study, 3)
+    with_table, without, blank, _ = (do(study, code, person=False) for code in ("P01", "P02", "P03", "P04"))
+    table, content, _ = rebuild(broken_off(with_table))
+    table.write_bytes(content)
+    broken_off(without)
+    broken_off(blank).write_bytes(b'{"n":0')
+    assert [(one.what, one.frozen, one.instead, one.who) for one in told(study).deviations] == [
+        ("participants who finished preference", 3, 1, ()),
+        ("began preference and did not finish it", None, None, ("P01", "P02", "P03")),
+    ]
 
 
 TEST = {"kind": "bayes-factor", "of": "direction", "scale": 0.5}

@@ -102,15 +102,32 @@ def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, 
     return tuple(found), tuple(said)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """A run by its journal: the first record, and whether the last one says that it came to its end."""
+
+    file: RunFile
+    head: Head
+    finished: bool
+
+    @property
+    def code(self) -> str:
+        return self.file.participant
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Looked:
-    """One study as it was found: its register, the heads of its journals, and how it stands."""
+    """One study as it was found: its register, its runs in the order in which they began, and how it stands.
+
+    `blank`: runs that were killed before anything was acknowledged.
+    """
 
     results: Path
     logs: Logs
     stand: FreezeStatus
     registered: Register
-    heads: tuple[tuple[RunFile, Head], ...]
+    runs: tuple[_Run, ...]
+    blank: tuple[RunFile, ...]
 
     @classmethod
     def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
@@ -118,15 +135,17 @@ class _Looked:
         chain = read_chain(results.parent)
         if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
             return None
-        heads = [(run, head) for run in runs if (head := _head(run)) is not None]
-        carried = [(head.plan.participant_id, head.preregistration_sha256) for _, head in heads]
-        mine = [one for one in heads if logs.kind == "synthetic" or one[1].participant == "person"]
+        read = [_read(run) for run in runs]
+        began = [one for one in read if isinstance(one, _Run)]
+        carried = [(one.head.plan.participant_id, one.head.preregistration_sha256) for one in began]
+        mine = [one for one in began if logs.kind == "synthetic" or one.head.participant == "person"]
         return cls(
             results=results,
             logs=logs,
             stand=freeze_status(results.parent, carried),
             registered=read_register(results),
-            heads=tuple(sorted(mine, key=lambda one: one[1].utc)),
+            runs=tuple(sorted(mine, key=lambda one: one.head.utc)),
+            blank=tuple(one for one in read if isinstance(one, RunFile)),
         )
 
     @property
@@ -148,11 +167,15 @@ def _names_one(path: str) -> bool:
         return False
 
 
-def _head(run: RunFile) -> Head | None:
+def _read(file: RunFile) -> _Run | RunFile | None:
+    """A run; the file itself if nothing of it was acknowledged."""
+    path = Path(file.path)
     try:
-        return journal.head(Path(run.path))
+        data = journal.journal_bytes(path)
+        head = journal.head_of(path, data)
     except JournalError:  # whose journal cannot be read is said elsewhere
         return None
+    return file if head is None else _Run(file=file, head=head, finished=any(journal.ending_of(data)))
 
 
 def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
@@ -203,11 +226,11 @@ def _changed(stand: FreezeStatus) -> Iterator[Deviation]:
 def _runs(looked: _Looked) -> Iterator[Deviation]:
     """What runs did otherwise: each difference once, with everybody of whom it holds."""
     found: dict[str, Deviation] = {}
-    for run, head in looked.heads:
-        if run.kind != "practice":
-            for one in _of_run(looked.chain, head):
-                key = repr(one)
-                who = (*found[key].who, head.plan.participant_id) if key in found else (head.plan.participant_id,)
+    for run in looked.runs:
+        if run.file.kind != "practice":
+            for one in _of_run(looked.chain, run.head):
+                key, code = repr(one), run.head.plan.participant_id
+                who = (*found[key].who, code) if key in found else (code,)
                 found[key] = replace(one, who=tuple(dict.fromkeys(who)))
     yield from found.values()
 
@@ -267,6 +290,8 @@ def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]
                 instead=len(done),
                 who=tuple(done[study.participants :]),
             )
+        if stopped := _unfinished(looked, experiment):
+            yield Deviation(kind="participants", what=f"began {experiment} and did not finish it", who=tuple(stopped))
     for code, member in looked.registered.members.items():
         for reason in () if member.facts is None else eligible(member.facts, study.eligibility):
             yield Deviation(kind="participants", what=f"took part, not eligible: {reason}", who=(code,))
@@ -274,24 +299,28 @@ def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]
 
 def _finished(looked: _Looked, experiment: str) -> list[str]:
     """Who finished an experiment and is not excluded by hand, in the order in which they began."""
-    begun = {one.file.path for one in looked.logs.begun}
-    return [
-        run.participant
-        for run, _ in looked.heads
-        if run.kind == "run" and run.experiment == experiment
-        if run.path not in begun and run.participant not in looked.excluded
-    ]
+    return [run.code for run in looked.runs if run.finished and _counts(looked, run.file, experiment)]
+
+
+def _unfinished(looked: _Looked, experiment: str) -> list[str]:
+    """Who began an experiment, did not finish it, with a table or without, and is not excluded by hand."""
+    files = [*(run.file for run in looked.runs if not run.finished), *looked.blank]
+    return [file.participant for file in files if _counts(looked, file, experiment)]
+
+
+def _counts(looked: _Looked, file: RunFile, experiment: str) -> bool:
+    return file.kind == "run" and file.experiment == experiment and file.participant not in looked.excluded
 
 
 def _exclusions(looked: _Looked) -> Iterator[Deviation]:
     """Exclusions by hand, logs that cannot be used, and runs that were set aside."""
     for code, reason in looked.excluded.items():
         yield Deviation(kind="exclusion", what=f"excluded by hand: {reason}", who=(code,))
-    for run, _ in looked.heads:
-        if run.kind == "set aside":
-            what = f"an unfinished run of {run.experiment} was set aside"
-            yield Deviation(kind="exclusion", what=what, who=(run.participant,))
-    mine = {(run.participant, run.experiment) for run, _ in looked.heads}
+    for run in looked.runs:
+        if run.file.kind == "set aside":
+            what = f"an unfinished run of {run.file.experiment} was set aside"
+            yield Deviation(kind="exclusion", what=what, who=(run.code,))
+    mine = {(run.code, run.file.experiment) for run in looked.runs}
     for problem in looked.logs.problems:
         person = problem.participant, problem.experiment
         if problem.study == str(looked.results) and person in mine and problem.participant not in looked.excluded:
