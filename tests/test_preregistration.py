@@ -38,6 +38,7 @@ from experiments.study.study import Facts
 from recoil.config_files import new_study
 from tests.conftest import Recoil, refused
 from tests.designs import changed
+from tests.log_files import rating_rows, ratings_path, write_rows
 from tests.tables_of_designs import loaded, simulated
 
 KEYS: dict[str, tuple[tuple[str, str, object, object], ...]] = {
@@ -142,8 +143,12 @@ def broken_off(path: Path) -> Path:
     """A journal whose run was stopped in the middle, without its table."""
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[: len(lines) // 2]))
-    path.with_name(path.name.replace("journal.jsonl", "ratings.csv")).unlink()
+    table_of(path).unlink()
     return path
+
+
+def table_of(path: Path) -> Path:
+    return path.with_name(path.name.replace("journal.jsonl", "ratings.csv"))
 
 
 def of_kind(found: StudyDeviations, kind: str) -> list[Deviation]:
@@ -342,6 +347,29 @@ def test_who_broke_off_has_not_finished_with_a_table_or_without(study: Path) -> 
         ("participants who finished preference", 3, 1, ()),
         ("began preference and did not finish it", None, None, ("P01", "P02", "P03")),
     ]
+
+
+def test_a_run_whose_journal_cannot_be_read_is_named_and_so_is_its_log(study: Path) -> None:
+    of_preference_alone(study, 3)
+    used, not_used, _, _ = (do(study, code, person=False) for code in ("P01", "P02", "P03", "P04"))
+    for path in (used, not_used):
+        path.write_text("garbage\n")
+    table_of(not_used).write_text("garbage\n")
+    found = told(study)
+    unread = "its journal cannot be read: under which preregistration, and whether it was finished, cannot be known"
+    assert of_kind(found, "run") == [Deviation(kind="run", what=f"run of preference: {unread}", who=("P01", "P02"))]
+    ((log, who),) = [(one.what, one.who) for one in of_kind(found, "exclusion")]
+    assert (log.partition(":")[0], who) == ("log of preference not used", ("P02",))
+    assert str(study) not in report(found)
+
+
+def test_a_log_of_people_that_cannot_be_used_is_named_without_a_journal_too_and_no_synthetic_one(study: Path) -> None:
+    of_preference_alone(study, 1)
+    do(study, "S01", person=False)
+    of_people = [one | {"rating_by": "participant"} for one in rating_rows("P01")]
+    for code in ("P01", "P02"):
+        write_rows(ratings_path(study / "results", code), of_people)
+    assert [one.who for one in of_kind(told(study), "exclusion")] == [("P02",)]
 
 
 TEST = {"kind": "bayes-factor", "of": "direction", "scale": 0.5}

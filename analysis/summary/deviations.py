@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -119,7 +120,8 @@ class _Run:
 class _Looked:
     """One study as it was found: its register, its runs in the order in which they began, and how it stands.
 
-    `blank`: runs that were killed before anything was acknowledged.
+    `blank`: runs that were killed before anything was acknowledged; `unread`: those whose journal cannot be read.
+    `strangers`: of which experiment who else has a run, as synthetic participants beside people.
     """
 
     results: Path
@@ -128,6 +130,8 @@ class _Looked:
     registered: Register
     runs: tuple[_Run, ...]
     blank: tuple[RunFile, ...]
+    unread: tuple[RunFile, ...]
+    strangers: frozenset[tuple[str, str]]
 
     @classmethod
     def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
@@ -135,8 +139,8 @@ class _Looked:
         chain = read_chain(results.parent)
         if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
             return None
-        read = [_read(run) for run in runs]
-        began = [one for one in read if isinstance(one, _Run)]
+        read = [(run, _read(run)) for run in runs]
+        began = [one for _, one in read if isinstance(one, _Run)]
         carried = [(one.head.plan.participant_id, one.head.preregistration_sha256) for one in began]
         mine = [one for one in began if logs.kind == "synthetic" or one.head.participant == "person"]
         return cls(
@@ -145,7 +149,9 @@ class _Looked:
             stand=freeze_status(results.parent, carried),
             registered=read_register(results),
             runs=tuple(sorted(mine, key=lambda one: one.head.utc)),
-            blank=tuple(one for one in read if isinstance(one, RunFile)),
+            blank=tuple(run for run, one in read if one == "blank"),
+            unread=tuple(run for run, one in read if one == "unread"),
+            strangers=frozenset((one.code, one.file.experiment) for one in began if one not in mine),
         )
 
     @property
@@ -167,15 +173,14 @@ def _names_one(path: str) -> bool:
         return False
 
 
-def _read(file: RunFile) -> _Run | RunFile | None:
-    """A run; the file itself if nothing of it was acknowledged."""
+def _read(file: RunFile) -> _Run | Literal["blank", "unread"]:
     path = Path(file.path)
     try:
         data = journal.journal_bytes(path)
         head = journal.head_of(path, data)
-    except JournalError:  # whose journal cannot be read is said elsewhere
-        return None
-    return file if head is None else _Run(file=file, head=head, finished=any(journal.ending_of(data)))
+    except JournalError:  # why it cannot be read is said elsewhere
+        return "unread"
+    return "blank" if head is None else _Run(file=file, head=head, finished=any(journal.ending_of(data)))
 
 
 def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
@@ -226,13 +231,23 @@ def _changed(stand: FreezeStatus) -> Iterator[Deviation]:
 def _runs(looked: _Looked) -> Iterator[Deviation]:
     """What runs did otherwise: each difference once, with everybody of whom it holds."""
     found: dict[str, Deviation] = {}
+    for one, code in _each_difference(looked):
+        key = repr(one)
+        who = (*found[key].who, code) if key in found else (code,)
+        found[key] = replace(one, who=tuple(dict.fromkeys(who)))
+    yield from found.values()
+
+
+def _each_difference(looked: _Looked) -> Iterator[tuple[Deviation, str]]:
     for run in looked.runs:
         if run.file.kind != "practice":
-            for one in _of_run(looked.chain, run.head):
-                key, code = repr(one), run.head.plan.participant_id
-                who = (*found[key].who, code) if key in found else (code,)
-                found[key] = replace(one, who=tuple(dict.fromkeys(who)))
-    yield from found.values()
+            yield from ((one, run.head.plan.participant_id) for one in _of_run(looked.chain, run.head))
+    for file in looked.unread:
+        if file.kind != "practice":
+            yield Deviation(kind="run", what=f"run of {file.experiment}: {_UNREAD}"), file.participant
+
+
+_UNREAD = "its journal cannot be read: under which preregistration, and whether it was finished, cannot be known"
 
 
 def _of_run(chain: Chain, head: Head) -> Iterator[Deviation]:
@@ -320,11 +335,11 @@ def _exclusions(looked: _Looked) -> Iterator[Deviation]:
         if run.file.kind == "set aside":
             what = f"an unfinished run of {run.file.experiment} was set aside"
             yield Deviation(kind="exclusion", what=what, who=(run.code,))
-    mine = {(run.code, run.file.experiment) for run in looked.runs}
     for problem in looked.logs.problems:
         person = problem.participant, problem.experiment
-        if problem.study == str(looked.results) and person in mine and problem.participant not in looked.excluded:
-            why = problem.message.partition(";")[0]
+        mine = problem.study == str(looked.results) and all(person) and person not in looked.strangers
+        if mine and problem.participant not in looked.excluded:
+            why = problem.message.partition(";")[0].replace(f"{problem.file.parent}{os.sep}", "")
             yield Deviation(kind="exclusion", what=f"log of {problem.experiment} not used: {why}", who=person[:1])
 
 
