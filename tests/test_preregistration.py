@@ -356,7 +356,10 @@ def test_a_run_whose_journal_cannot_be_read_is_named_and_so_is_its_log(study: Pa
         path.write_text("garbage\n")
     table_of(not_used).write_text("garbage\n")
     found = told(study)
-    unread = "its journal cannot be read: under which preregistration, and whether it was finished, cannot be known"
+    unread = (
+        "there is no journal that can be read: under which preregistration, "
+        "and whether it was finished, cannot be known"
+    )
     assert of_kind(found, "run") == [Deviation(kind="run", what=f"run of preference: {unread}", who=("P01", "P02"))]
     ((log, who),) = [(one.what, one.who) for one in of_kind(found, "exclusion")]
     assert (log.partition(":")[0], who) == ("log of preference not used", ("P02",))
@@ -370,6 +373,23 @@ def test_a_log_of_people_that_cannot_be_used_is_named_without_a_journal_too_and_
     for code in ("P01", "P02"):
         write_rows(ratings_path(study / "results", code), of_people)
     assert [one.who for one in of_kind(told(study), "exclusion")] == [("P02",)]
+
+
+def test_who_finished_and_was_not_given_to_the_analysis_is_named(study: Path) -> None:
+    of_preference_alone(study, 4)
+    journals = [do(study, code, person=False) for code in ("P01", "P02", "P03", "P04")]
+    do(study, "P05")  # of another kind than these: not compared
+    folders, tables = [path.parent for path in journals], [*map(table_of, journals)]
+    used = AnalysisFiles(rules=study / "rules.toml", requests=study / "requests.toml")
+    for paths in (folders[:2], tables[:2]):
+        ((found,), _) = deviations(read_logs(paths), used)
+        assert [(one.what, one.frozen, one.instead, one.who) for one in found.deviations] == [
+            ("participants who finished preference", 4, 2, ()),
+            ("finished preference and not given to this analysis", None, None, ("P03", "P04")),
+        ]
+    for paths in (folders, tables):
+        ((found,), _) = deviations(read_logs(paths), used)
+        assert found.deviations == ()
 
 
 TEST = {"kind": "bayes-factor", "of": "direction", "scale": 0.5}

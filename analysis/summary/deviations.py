@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Literal
 
 from pydantic import JsonValue
 
-from analysis.logs.journals import RunFile
+from analysis.logs.journals import RunFile, journal_of, run_file
 from analysis.logs.reading import Logs
 from experiments.config.door import read_toml
 from experiments.record import journal, storage
@@ -121,7 +121,8 @@ class _Looked:
     """One study as it was found: its register, its runs in the order in which they began, and how it stands.
 
     `blank`: runs that were killed before anything was acknowledged; `unread`: those whose journal cannot be read.
-    `strangers`: of which experiment who else has a run, as synthetic participants beside people.
+    `strangers`: of which experiment who else has a run, as synthetic participants beside people. `elsewhere`: runs that
+    lie in the study's results and were not given to the analysis.
     """
 
     results: Path
@@ -132,6 +133,7 @@ class _Looked:
     blank: tuple[RunFile, ...]
     unread: tuple[RunFile, ...]
     strangers: frozenset[tuple[str, str]]
+    elsewhere: tuple[_Run, ...]
 
     @classmethod
     def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
@@ -139,7 +141,8 @@ class _Looked:
         chain = read_chain(results.parent)
         if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
             return None
-        read = [(run, _read(run)) for run in runs]
+        given = _given(results, logs, runs)
+        read = [(run, _read(run)) for run in given.values()]
         began = [one for _, one in read if isinstance(one, _Run)]
         carried = [(one.head.plan.participant_id, one.head.preregistration_sha256) for one in began]
         mine = [one for one in began if logs.kind == "synthetic" or one.head.participant == "person"]
@@ -152,6 +155,7 @@ class _Looked:
             blank=tuple(run for run, one in read if one == "blank"),
             unread=tuple(run for run, one in read if one == "unread"),
             strangers=frozenset((one.code, one.file.experiment) for one in began if one not in mine),
+            elsewhere=tuple(_not_given(results, logs, given)),
         )
 
     @property
@@ -171,6 +175,33 @@ def _names_one(path: str) -> bool:
         return b'"preregistration_sha256":' in storage.first_line(path)
     except OSError:
         return False
+
+
+def _given(results: Path, logs: Logs, runs: Iterable[RunFile]) -> dict[str, RunFile]:
+    """By the place of its journal every run that the analysis knows, also where its table alone was given."""
+    found = {_place(run.path): run for run in runs}
+    for place in map(_place, map(journal_of, logs.paths)):
+        run = run_file(place, str(results))
+        if run is not None and Path(place).parent.parent == results:
+            found.setdefault(place, run)
+    return found
+
+
+def _not_given(results: Path, logs: Logs, given: Collection[str]) -> Iterator[_Run]:
+    """The runs of people, or in a rehearsal those of synthetic participants, that it does not know."""
+    whose = "synthetic" if logs.kind == "synthetic" else "person"
+    known = {*given, *(_place(journal_of(str(problem.file))) for problem in logs.problems)}
+    for path in sorted(results.glob("sub-*/sub-*_journal.jsonl")):
+        file = run_file(str(path), str(results))
+        one = None if file is None or str(path) in known else _read(file)
+        if isinstance(one, _Run) and one.head.participant == whose:
+            yield one
+
+
+def _place(path: str) -> str:
+    """A file by its real folder; its own name stays, also where it is a link."""
+    folder, name = os.path.split(path)
+    return f"{os.path.realpath(folder)}{os.sep}{name}"
 
 
 def _read(file: RunFile) -> _Run | Literal["blank", "unread"]:
@@ -247,7 +278,9 @@ def _each_difference(looked: _Looked) -> Iterator[tuple[Deviation, str]]:
             yield Deviation(kind="run", what=f"run of {file.experiment}: {_UNREAD}"), file.participant
 
 
-_UNREAD = "its journal cannot be read: under which preregistration, and whether it was finished, cannot be known"
+_UNREAD = (
+    "there is no journal that can be read: under which preregistration, and whether it was finished, cannot be known"
+)
 
 
 def _of_run(chain: Chain, head: Head) -> Iterator[Deviation]:
@@ -305,6 +338,10 @@ def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]
                 instead=len(done),
                 who=tuple(done[study.participants :]),
             )
+        missing = [run.code for run in looked.elsewhere if run.finished and _counts(looked, run.file, experiment)]
+        if missing:
+            what = f"finished {experiment} and not given to this analysis"
+            yield Deviation(kind="participants", what=what, who=tuple(missing))
         if stopped := _unfinished(looked, experiment):
             yield Deviation(kind="participants", what=f"began {experiment} and did not finish it", who=tuple(stopped))
     for code, member in looked.registered.members.items():
