@@ -15,7 +15,7 @@ from analysis.archive.making import preregistration_faults
 from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
-from analysis.summary.analyze import Request, result_files
+from analysis.summary.analyze import Request, analyze, result_files
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
@@ -240,6 +240,57 @@ def test_what_cannot_be_frozen_is_refused_with_its_place(study: Path, tmp_path: 
     assert not [*study.glob("preregistration-*")]
 
 
+WEIGHTS = 'kind = "contrasts"\nof = "direction"\nweights.x = { asymmetric-9 = 1, asymmetric-1 = -1 }'
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        (WEIGHTS, "there is no condition 'asymmetric-9'; there are vibration, asymmetric-1, asymmetric-2"),
+        ('kind = "equivalence"\nof = "preference"\na = "nope"\nlow = -1.0\nhigh = 1.0', "there is no condition 'nope'"),
+        ('kind = "mixed-model"\nof = "direction"\nterms = ["bogus"]', "terms: there is no factor 'bogus' that varies"),
+        ('kind = "bayes-factor"\nof = "direction"\nquestion = "response"', "question: direction has one measure"),
+    ],
+)
+def test_a_test_that_cannot_be_made_is_refused_before_it_is_frozen(study: Path, request_: str, said: str) -> None:
+    (study / "requests.toml").write_text(f"{REQUEST}\n[[requests]]\n{request_}\n")
+    with pytest.raises(ConfigError, match=rf"requests\.toml:6: requests\.1: {re.escape(said)}"):
+        freeze(study, "", RealClock())
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        check(str(study / "study.toml"), None, 14)
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ('kind = "bayes-factor"\nof = "realism"', "question: say which one; realism has realism, comfort"),
+        ('kind = "bayes-factor"\nof = "realism"\nquestion = "whatever"', "question = 'whatever': realism has realism"),
+        ('kind = "bayes-factor"\nof = "realism"\nquestion = "comfort"', "a Bayes factor is of one factor"),
+        (
+            'kind = "equivalence"\nof = "realism"\nquestion = "comfort"\na = "off/1"\nlow = -1.0\nhigh = 1.0',
+            "there is no condition 'off/1'; there are off/",
+        ),
+    ],
+)
+def test_tests_of_a_design_are_held_against_its_questions_and_conditions(
+    tmp_path: Path, request_: str, said: str
+) -> None:
+    new_study(tmp_path / "own", "realism")
+    (tmp_path / "own" / "requests.toml").write_text(f"[[requests]]\n{request_}\n")
+    with (tmp_path / "own" / "study.toml").open("a") as file:
+        file.write('\n[preregistration]\nrequests = "requests.toml"\n')
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        freeze(tmp_path / "own", "", RealClock())
+
+
+def test_a_rule_about_a_method_that_no_design_has_is_refused_before_it_is_frozen(study: Path) -> None:
+    (study / "rules.toml").write_text(f'{RULES}[[accuracy]]\nmethod = "asymmetric-9"\nmin_share = 0.6\n')
+    with pytest.raises(
+        ConfigError, match=r"rules\.toml:7: accuracy\.0\.method = 'asymmetric-9': no design of this study"
+    ):
+        freeze(study, "", RealClock())
+
+
 @pytest.mark.parametrize(
     "name", ["detection", "grip", "hurry", "magnitude", "pairs", "preference", "realism", "stronger", "voltages"]
 )
@@ -412,7 +463,7 @@ def test_other_rules_and_tests_than_were_frozen_are_told(begun: Path, tmp_path: 
         ("--fits: the diffusion model", False, True),
     ]
     none = of_kind(told(begun, rules=None, requests=None), "analysis")
-    assert [one.what for one in none] == ["--rules was not given", "a frozen test that was not made (--requests)"]
+    assert [one.what for one in none] == ["--rules was not given", "a frozen test that was not made"]
 
 
 def test_why_the_rules_leave_somebody_out_is_not_frozen_and_no_deviation(study: Path) -> None:
@@ -449,8 +500,10 @@ def test_frozen_tests_are_made_unless_a_file_asks_for_others(study: Path) -> Non
 
     answered, tests, (warned,) = made(asked)
     assert answered == ["preference: Asked for by the preregistration. B"]
-    assert tests == ["a frozen test that was not made (--requests)"]
+    assert tests == ["a frozen test that was not made"]
     assert warned.startswith("a frozen test is not made: requests.1: of = 'direction': there are no logs of it")
+    _, said, _ = analyze(asked)
+    assert f"{study}: 1 frozen test not made; the report names each, and its warnings why" in said
     (study / "requests.toml").write_text(of_ratings)
     answered, tests, warnings = made(replace(asked, requests=study / "requests.toml"))
     assert answered == ["preference: Bayes factor of the repeated-measur"]

@@ -19,7 +19,7 @@ from analysis.stats.anova_bayes import rm_anova_bayes_factor
 from analysis.stats.contrasts import planned_contrasts
 from analysis.stats.equivalence import tost_one_sample, tost_paired
 from analysis.summary.analyze import Request, analyze
-from analysis.summary.request_data import answers_to, request_data
+from analysis.summary.request_data import answers_to, planned_names, request_data
 from analysis.summary.requests import BayesFactorRequest, Requested, Requests
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
@@ -60,6 +60,20 @@ def of_designs(*names: str) -> Logs:
         config, laws = loaded(name)
         designs.append(DesignLogs(design=config, table=simulated(config, laws, 8), gun_labels={}))
     return Logs(trials=empty, ratings=empty, paths=(), problems=(), designs=tuple(designs))
+
+
+@pytest.mark.parametrize("name", ["grip", "hurry", "magnitude", "preference", "realism", "stronger", "voltages"])
+def test_what_a_request_may_name_is_known_before_there_are_data(name: str) -> None:
+    design, _ = loaded(name)
+    question = next(name for name, one in design.questions.items() if one.kind != "text")
+    asked = BayesFactorRequest(kind="bayes-factor", of=design.design, question=question)
+    there = request_data(of_designs(name), asked).names
+    planned = planned_names(design.model_copy(update={"design": "own"}), question)
+    assert (set(planned.conditions), planned.factors, planned.grouped) == (
+        set(there.conditions),
+        there.factors,
+        there.grouped,
+    )
 
 
 def asked(tmp_path: Path, text: str, logs: Logs) -> tuple[Requested, ...]:

@@ -8,15 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.archive.preregistration_page import Planned, page
-from analysis.logs.exclusion_rules import Rules
-from analysis.paper.paper import load_paper
 from analysis.report.serial import as_json
-from analysis.summary.remarks_coding import load_codebook
-from analysis.summary.requests import Requests
+from analysis.summary.planned_files import planned_files
 from experiments.clock import Clock
-from experiments.config.door import ConfigError, at_key, load
-from experiments.config.setup import Setup
-from experiments.design.config import DesignConfig
 from experiments.load import check_limits
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
@@ -90,38 +84,9 @@ def _study(folder: Path) -> StudyFolder:
 
 
 def _planned(study: StudyFolder) -> Planned:
-    """The study with its further files, each checked as `recoil analyze` will read it."""
-    own, names = study.config.preregistration, {"paper": study.config.paper}
-    names |= {key: getattr(own, key) for key in ("rules", "requests", "codebook")}
-    files = {key: _file(study, key, name) for key, name in names.items() if name is not None}
-    if "paper" in files:
-        load_paper(files["paper"])
-    if "codebook" in files:
-        load_codebook(files["codebook"])
-    requests = load(Requests, files["requests"]) if "requests" in files else None
-    for one in () if requests is None else requests.requests:
-        _refuse_stranger(files["requests"], one.of, study.setups)
-    return Planned(
-        study=study.config,
-        setups=study.setups,
-        rules=load(Rules, files["rules"]) if "rules" in files else None,
-        requests=() if requests is None else requests.requests,
-    )
-
-
-def _file(study: StudyFolder, key: str, name: str) -> Path:
-    path = study.source.parent / name
-    if not path.is_file():
-        place = key if key == "paper" else f"preregistration.{key}"
-        rule = f"{place} = {name!r}: no such file beside the study; write it, or leave the key out"
-        raise ConfigError(at_key(study.source, rule))
-    return path
-
-
-def _refuse_stranger(path: Path, of: str, setups: tuple[Setup[DesignConfig], ...]) -> None:
-    known = [setup.config.experiment for setup in setups]
-    if of not in known:
-        raise ConfigError(f"{path}: of = {of!r}: no experiment of this study; it has {', '.join(known)}")
+    """The study with what its further files say."""
+    files = planned_files(study.source, study.config, [setup.config for setup in study.setups])
+    return Planned(study=study.config, setups=study.setups, rules=files.rules, requests=files.requests)
 
 
 def _begun(study: StudyFolder) -> Iterator[str]:

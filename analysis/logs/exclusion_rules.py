@@ -24,7 +24,7 @@ where they have the columns; then participants.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
@@ -41,6 +41,7 @@ from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray
 from analysis.times.own_trials import timed
 from experiments.config.door import Model, Seconds, Share
+from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR
 from experiments.record.tables import TRACK_OVER
 from experiments.tasks.questions import correct_columns
@@ -303,7 +304,21 @@ def _idle(logs: Logs, rules: Rules) -> Iterator[str]:
     for listed in rules.excluded:
         if not any(_codes(one.table, listed) for one in there):
             yield f"the rules exclude {listed.code}, who has no log here"
-    for accuracy in rules.accuracy:
-        scored = (one.table for one in there if one.scored and METHOD_FACTOR in one.table)
-        if not any((table[METHOD_FACTOR] == accuracy.method).any() for table in scored):
-            yield f"the rules ask for accuracy with {accuracy.method}, which no log with right answers has"
+    scored = (one.table for one in there if one.scored and METHOD_FACTOR in one.table)
+    methods = {str(method) for table in scored for method in table[METHOD_FACTOR].dropna().unique()}
+    for _, method in without_trials_of(rules, methods):
+        yield f"the rules ask for accuracy with {method}, which no log with right answers has"
+
+
+def without_trials_of(rules: Rules, methods: Collection[str]) -> Iterator[tuple[int, str]]:
+    """The rules of accuracy that mean none of these methods: the place of each, and its own method."""
+    for place, accuracy in enumerate(rules.accuracy):
+        if accuracy.method not in methods:
+            yield place, accuracy.method
+
+
+def methods_with_right_answers(designs: Iterable[DesignConfig]) -> tuple[str, ...]:
+    """The methods that rules of accuracy can be about in the data of these designs."""
+    scored = [design.factors for design in designs if correct_columns(design.questions)]
+    levels = (level for factors in scored if METHOD_FACTOR in factors for level in factors[METHOD_FACTOR].all_levels)
+    return tuple(dict.fromkeys(map(str, levels)))

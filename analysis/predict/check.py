@@ -97,6 +97,11 @@ def _study(name: str, seed: int | None) -> StudyCheck:
     if study.paper is not None:
         _check_paper(find(name), folder / study.paper)
     setups = [load_setup(folder / experiment) for experiment in study.experiments]
+    own = study.preregistration
+    if any(one is not None for one in (own.rules, own.requests, own.codebook)):
+        from analysis.summary.planned_files import planned_files  # noqa: PLC0415 - most studies name no such files
+
+        planned_files(find(name), study, [setup.config for setup in setups])
     return StudyCheck(
         study=study.title,
         participants=study.participants,

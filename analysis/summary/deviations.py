@@ -13,6 +13,7 @@ from pydantic import JsonValue
 
 from analysis.logs.journals import RunFile, journal_of, run_file
 from analysis.logs.reading import Logs
+from device.words import how_many
 from experiments.config.door import read_toml
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
@@ -89,7 +90,7 @@ class AnalysisFiles:
 def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, ...], tuple[str, ...]]:
     """The deviations of each study that is frozen, or whose journals name a preregistration.
 
-    Beside them what was edited or is missing, with its place, for whoever made the analysis.
+    Beside them what was edited or is missing, with its place, and what was not made, for whoever made the analysis.
     """
     found, said = list[StudyDeviations](), list[str]()
     runs: dict[str, list[RunFile]] = {name: [] for name in logs.names}
@@ -99,8 +100,16 @@ def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, 
         looked = _Looked.at(Path(results), logs, some) if Path(results).is_absolute() else None
         if looked is not None:
             said += looked.stand.problems
-            found.append(_of_study(looked, used))
+            one = _of_study(looked, used)
+            found.append(one)
+            said += _not_made(Path(results).parent, one)
     return tuple(found), tuple(said)
+
+
+def _not_made(folder: Path, found: StudyDeviations) -> Iterator[str]:
+    count = sum(one.what.startswith(_NOT_MADE) for one in found.deviations)
+    if count:
+        yield f"{folder}: {how_many(count, 'frozen test')} not made; the report names each, and its warnings why"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -407,6 +416,9 @@ def _file(last: Preregistration, option: str, name: str | None, path: Path | Non
         yield Deviation(kind="analysis", what=what, frozen=change.frozen, instead=change.now)
 
 
+_NOT_MADE = "a frozen test that was not made"
+
+
 def _requests(last: Preregistration, used: AnalysisFiles) -> Iterator[Deviation]:
     """Tests that were not frozen, which are exploratory, and those that were and are not made."""
     frozen = _frozen_tests(last)
@@ -414,9 +426,10 @@ def _requests(last: Preregistration, used: AnalysisFiles) -> Iterator[Deviation]
     for one in made:
         if one not in frozen:
             yield Deviation(kind="analysis", what="a test that was not frozen: exploratory", instead=one)
+    others = "" if used.requests is None else " (--requests)"
     for one in frozen:
         if one not in made:
-            yield Deviation(kind="analysis", what="a frozen test that was not made (--requests)", frozen=one)
+            yield Deviation(kind="analysis", what=f"{_NOT_MADE}{others}", frozen=one)
 
 
 def frozen_tests(logs: Logs) -> Sequence[JsonValue]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import pandas as pd
@@ -15,13 +16,12 @@ from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
-from analysis.summary.designs import question_scores
-from analysis.summary.requests import AnyRequest, RequestData, Requested, Requests, answer_to
+from analysis.summary.designs import question_scores, varied
+from analysis.summary.requests import AnyRequest, RequestData, Requested, RequestNames, Requests, answer_to
 from analysis.summary.summary import methods_in
-from experiments.config.door import ConfigError, read_text
-from experiments.config.findings import line_of
+from experiments.config.door import ConfigError, at_key
 from experiments.design.config import DesignConfig
-from experiments.design.language import QuestionConfig, shown_level
+from experiments.design.language import METHOD_FACTOR, Level, QuestionConfig, shown_level
 
 
 def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]:
@@ -31,8 +31,7 @@ def answers_to(asked: Requests, path: Path, logs: Logs) -> tuple[Requested, ...]
         try:
             found.append(answer_to(request, request_data(logs, request)))
         except ValueError as error:
-            line = line_of(read_text(path), ["requests", str(place)])
-            faults.append(f"{path}{f':{line}' if line else ''}: requests.{place}: {error}")
+            faults.append(at_key(path, f"requests.{place}: {error}"))
     if faults:
         raise ConfigError("\n".join(faults))
     return tuple(found)
@@ -50,18 +49,53 @@ def request_data(logs: Logs, request: AnyRequest) -> RequestData:
     there = {name: table for name, table in logs.tables.items() if len(table)}
     designs = {one.design.design: one for one in logs.designs}
     if request.of in there:
-        if request.question is not None:
-            raise ValueError(f"question: {request.of} has one measure; leave the key out")
+        _refuse_question(request.of, request.question)
         return _of_experiment(request.of, there[request.of], logs.methods)
     if request.of in designs:
         return _of_design(designs[request.of].design, request.question, designs[request.of].table)
     raise ValueError(f"of = {request.of!r}: there are no logs of it; there are some of {', '.join((*there, *designs))}")
 
 
-def _of_experiment(name: str, table: pd.DataFrame, names: MethodNames) -> RequestData:
+def planned_names(design: DesignConfig, asked: str | None) -> RequestNames:
+    """What a request may name in the data that a design gives. `ValueError`: of no such question, or of none tested."""
+    if design.design in MEASURES:
+        _refuse_question(design.design, asked)
+        methods = design.factors[METHOD_FACTOR].all_levels
+        return RequestNames(conditions=tuple(map(str, methods)), factors={METHOD_FACTOR: methods})
+    _question(design, asked)
+    within = [design.factors[name].all_levels for name in varied(design) if name not in design.between]
+    conditions = tuple(_conditions(product(*within))) if within else ("score",)
+    return RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between))
+
+
+def _refuse_question(name: str, asked: str | None) -> None:
+    if asked is not None:
+        raise ValueError(f"question: {name} has one measure; leave the key out")
+
+
+def _question(design: DesignConfig, asked: str | None) -> str:
+    """The question that is asked about; without one, the only one that is not of words."""
+    names = [name for name, question in design.questions.items() if question.kind != "text"]
+    if not names:
+        raise ValueError(f"{design.design} asks for words alone, which are described, not tested")
+    if asked is None and len(names) > 1:
+        raise ValueError(f"question: say which one; {design.design} has {', '.join(names)}")
+    name = asked or names[0]
+    if name not in names:
+        raise ValueError(f"question = {asked!r}: {design.design} has {', '.join(names)}")
+    if design.trial.kind == "pair":
+        raise ValueError("pairs are described, not tested")
+    return name
+
+
+def _factors(design: DesignConfig) -> dict[str, tuple[Level, ...]]:
+    return {name: factor.all_levels for name, factor in design.factors.items() if len(factor.all_levels) > 1}
+
+
+def _of_experiment(name: str, table: pd.DataFrame, called: MethodNames) -> RequestData:
     """Everybody who is complete."""
     measure = MEASURES[name]
-    methods = methods_in(table, names)
+    methods = methods_in(table, called)
     rows = complete_rows(coded(table), name, methods)[0]
     if measure.direction is not None:
         rows = rows[rows["direction"] == measure.direction]
@@ -73,23 +107,20 @@ def _of_experiment(name: str, table: pd.DataFrame, names: MethodNames) -> Reques
         }
     )
     scores = trials.pivot_table(index="participant_id", columns="method", values="score").reindex(columns=methods)
-    return RequestData(scores=scores, trials=trials, factors={"method": tuple(methods)}, unit=measure.unit)
+    names = RequestNames(conditions=tuple(methods), factors={METHOD_FACTOR: tuple(methods)})
+    return RequestData(scores=scores, trials=trials, unit=measure.unit, names=names)
 
 
 def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> RequestData:
-    names = [name for name, question in design.questions.items() if question.kind != "text"]
-    if asked is None and len(names) > 1:
-        raise ValueError(f"question: say which one; {design.design} has {', '.join(names)}")
-    name = asked or names[0]
-    if name not in names:
-        raise ValueError(f"question = {asked!r}: {design.design} has {', '.join(names)}")
-    if design.trial.kind == "pair":
-        raise ValueError("pairs are described, not tested")
+    name = _question(design, asked)
     found = question_scores(design, name, table)
-    levels = {one: factor.all_levels for one, factor in design.factors.items() if len(factor.all_levels) > 1}
-    scores = found.people.set_axis([*_conditions(found.people.columns)], axis=1)
-    unit = _unit(design.questions[name])
-    return RequestData(scores=scores, trials=found.real, factors=levels, unit=unit, grouped=bool(design.between))
+    conditions = tuple(_conditions(found.people.columns))
+    return RequestData(
+        scores=found.people.set_axis([*conditions], axis=1),
+        trials=found.real,
+        unit=_unit(design.questions[name]),
+        names=RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between)),
+    )
 
 
 def _unit(question: QuestionConfig) -> str:

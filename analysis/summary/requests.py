@@ -12,7 +12,7 @@ direction the share of right answers to forward shots. A condition of several fa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Annotated, Literal
@@ -105,20 +105,53 @@ class Requested:
     result: AnyResult
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequestNames:
+    """What a request may name: conditions, and factors with their levels in the order of the design.
+
+    `grouped`: some factor varies between people.
+    """
+
+    conditions: tuple[str, ...]
+    factors: Mapping[str, tuple[Level, ...]]
+    grouped: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RequestData:
     """What requests are answered from.
 
     `scores`: participants by conditions, no cell empty; `trials`: a row a trial, with `participant_id`, `score` and the
-    `factors`, whose levels come in the order of the design. `unit`: what a score is; `grouped`: some factor varies
-    between people.
+    factors. `unit`: what a score is.
     """
 
     scores: pd.DataFrame
     trials: pd.DataFrame
-    factors: Mapping[str, tuple[Level, ...]]
     unit: str
-    grouped: bool = False
+    names: RequestNames
+
+
+def check_names(request: AnyRequest, names: RequestNames) -> None:
+    """`ValueError` if a request names what is not there, or asks what such a design cannot answer."""
+    match request:
+        case ContrastsRequest():
+            _check_conditions((name for weights in request.weights.values() for name in weights), names)
+        case EquivalenceRequest():
+            _check_conditions((request.a, *(() if request.b is None else (request.b,))), names)
+        case BayesFactorRequest():
+            if names.grouped or len(names.factors) > 1:
+                raise ValueError("a Bayes factor is of one factor within people, and there are more")
+        case MixedModelRequest() | LogisticRequest():
+            for name in _named_factors(request.terms, names):
+                if name not in names.factors:
+                    there = ", ".join(names.factors)
+                    raise ValueError(f"terms: there is no factor {name!r} that varies; there are {there}")
+
+
+def _check_conditions(asked: Iterable[str], names: RequestNames) -> None:
+    for name in asked:
+        if name not in names.conditions:
+            raise ValueError(f"there is no condition {name!r}; there are {', '.join(names.conditions)}")
 
 
 _CORRECTED = {
@@ -130,6 +163,7 @@ _CORRECTED = {
 
 def answer_to(request: AnyRequest, data: RequestData) -> Requested:
     """The answer to a request. `ValueError` if the data have not what it names, with what they have."""
+    check_names(request, data.names)
     match request:
         case ContrastsRequest():
             note, result = _contrasts(request, data)
@@ -142,7 +176,7 @@ def answer_to(request: AnyRequest, data: RequestData) -> Requested:
         case LogisticRequest():
             note, result = _logistic(request, data)
     of_trials = isinstance(result, LinearMixedModel | RandomInterceptLogit)
-    together = ", people of all groups together" if data.grouped else ""
+    together = ", people of all groups together" if data.names.grouped else ""
     said = f"The trials: {data.unit}" if of_trials else f"Scores: participants' means of {data.unit}{together}"
     return Requested(
         kind=request.kind,
@@ -155,11 +189,7 @@ def answer_to(request: AnyRequest, data: RequestData) -> Requested:
 
 
 def _contrasts(request: ContrastsRequest, data: RequestData) -> tuple[str, AnyResult]:
-    for weights in request.weights.values():
-        for name in weights:
-            _column(data, name)
-    names = [str(name) for name in data.scores.columns]
-    wide = {name: [weights.get(one, 0.0) for one in names] for name, weights in request.weights.items()}
+    wide = {name: [weights.get(one, 0.0) for one in data.names.conditions] for name, weights in request.weights.items()}
     note = (
         "Contrasts of the participants' scores, each on its own error (t on n − 1 degrees of freedom), which needs no "
         f"sphericity; {_CORRECTED[request.correction]}; intervals of each contrast by itself."
@@ -183,9 +213,6 @@ def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, A
 
 
 def _bayes_factor(request: BayesFactorRequest, data: RequestData) -> tuple[str, AnyResult]:
-    within = len(data.factors)
-    if data.grouped or within > 1:
-        raise ValueError("a Bayes factor is of one factor within people, and there are more")
     note = (
         "Bayes factor of the repeated-measures ANOVA: conditions and participants against participants alone (Rouder "
         f"et al. 2012), of the participants' scores; effects Cauchy, r = {request.scale:g} for the conditions and "
@@ -232,20 +259,22 @@ def _table(data: RequestData) -> FloatArray:
 
 
 def _column(data: RequestData, name: str) -> FloatArray:
-    names = [str(one) for one in data.scores.columns]
-    if name not in names:
-        raise ValueError(f"there is no condition {name!r}; there are {', '.join(names)}")
     return data.scores[name].to_numpy(dtype=np.float64)
 
 
-def _terms(terms: tuple[str, ...], data: RequestData) -> tuple[str, ...]:
-    return terms or tuple(data.factors)
+def _terms(terms: tuple[str, ...], names: RequestNames) -> tuple[str, ...]:
+    return terms or tuple(names.factors)
+
+
+def _named_factors(terms: tuple[str, ...], names: RequestNames) -> tuple[str, ...]:
+    """The factors of all terms, each once."""
+    return tuple(dict.fromkeys(name for term in _terms(terms, names) for name in term.split(":")))
 
 
 def _predictors(terms: tuple[str, ...], data: RequestData) -> dict[str, FloatArray]:
     """The columns of all terms by name; those of several factors are products."""
     found: dict[str, FloatArray] = {}
-    for term in _terms(terms, data):
+    for term in _terms(terms, data.names):
         columns: dict[str, FloatArray] = {}
         for name in term.split(":"):
             own = _factor_columns(name, data)
@@ -256,9 +285,7 @@ def _predictors(terms: tuple[str, ...], data: RequestData) -> dict[str, FloatArr
 
 def _factor_columns(name: str, data: RequestData) -> dict[str, FloatArray]:
     """A factor of numbers as it is, one of words as indicators against its first level."""
-    if name not in data.factors:
-        raise ValueError(f"terms: there is no factor {name!r} that varies; there are {', '.join(data.factors)}")
-    column, levels = data.trials[name], data.factors[name]
+    column, levels = data.trials[name], data.names.factors[name]
     if not isinstance(levels[0], str):
         return {name: column.to_numpy(dtype=np.float64)}
     given = [str(level) for level in column]
@@ -273,7 +300,7 @@ def _references(terms: tuple[str, ...], data: RequestData) -> str:
 
 
 def _first_levels(terms: tuple[str, ...], data: RequestData) -> Iterator[tuple[str, str]]:
-    for name in dict.fromkeys(name for term in _terms(terms, data) for name in term.split(":")):
-        levels = data.factors.get(name, ())
+    for name in _named_factors(terms, data.names):
+        levels = data.names.factors[name]
         if levels and isinstance(levels[0], str):
             yield name, levels[0]

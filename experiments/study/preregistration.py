@@ -169,9 +169,9 @@ def changed_keys(file: str, frozen: FileValues, now: FileValues) -> Iterator[Key
 
 
 def _leaves(value: JsonValue | FileValues, key: str = "") -> Iterator[tuple[str, JsonValue]]:
-    """Dotted keys with what is no table; the tables of a list are numbered from 1."""
+    """Dotted keys with what is no table; the tables of a list are numbered from 0, as everywhere."""
     if isinstance(value, list) and any(isinstance(one, dict) for one in value):
-        value = {str(number): one for number, one in enumerate(value, start=1)}
+        value = {str(number): one for number, one in enumerate(value)}
     if not isinstance(value, Mapping):
         yield key, value
         return
