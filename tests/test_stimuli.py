@@ -110,6 +110,40 @@ def test_what_the_gun_cannot_do_is_refused_by_name(gun, factors, said):
     assert said in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "levels", "meant"),
+    [
+        ("voltage", [10.0, 12.0], "voltage_V"),
+        ("voltage_v", [10.0, 12.0], "voltage_V"),
+        ("Voltage_mV", [10.0, 12.0], "voltage_V"),
+        ("pulse_ms", [6.0, 10.0], "pulse_s"),
+        ("friction", [0.2, 1.1], "friction_N"),
+        ("return_friction", [0.2, 1.1], "return_friction_N"),
+        ("repeat_every", [1.0, 2.0], "repeat_every_s"),
+        ("Directions", ["forward", "backward"], "direction"),
+    ],
+)
+def test_a_number_of_the_gun_without_its_unit_is_no_factor_of_the_hand_which_would_fire_every_shot_alike(
+    name, levels, meant
+):
+    with pytest.raises(ConfigError, match=rf"factors\.{name}: did you mean {meant}\?"):
+        design(factors={"method": STRONG, name: {"levels": levels}})
+
+
+def test_a_hand_sets_numbers_that_the_model_is_told_or_that_are_called_otherwise(gun):
+    told = {"8": {"voltage_V": 8.0}, "12": {"voltage_V": 12.0}}
+    config = design(
+        factors={
+            "method": STRONG,
+            "voltage_dial": {"levels": [8.0, 12.0], "sets": told},
+            "pads": {"levels": [1.0, 2.0]},
+            "direction_of_gaze": {"levels": ["ahead", "down"]},
+        }
+    )
+    assert stimuli.by_hand(config) == ("voltage_dial", "pads", "direction_of_gaze")
+    assert {cell.drive.voltage_V for cell in stimuli.limits(config, gun)} == {8.0, 12.0}
+
+
 def test_below_break_away_is_listed_where_the_design_asks_for_it(gun):
     config = design(below_break_away=True, factors={"method": STRONG, "voltage_V": {"levels": [0.5, 16.0]}})
     assert [one.status for one in stimuli.limits(config, gun)] == ["no-break-away", "home"]

@@ -6,16 +6,19 @@ What only the gun can tell (its methods, its limits) is checked when both are lo
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from device.parameters import GunParameters
 from device.words import Direction
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
 from experiments.config.findings import DESIGN_NAME, LANGUAGE_CODE
 from experiments.config.lines import LineText
 from experiments.design.language import (
     DIRECTION_FACTOR,
+    DRIVEN,
     EMPTY,
     INSTRUCTION_FACTOR,
     INTERVAL_NAMES,
@@ -37,6 +40,13 @@ from experiments.design.plan import Condition, in_interval
 from experiments.design.procedure_problems import procedure_problems
 from experiments.design.procedures.config import AdaptiveConfig, ConstantConfig, PairingConfig, ProcedureConfig
 from experiments.design.units import parted
+
+GUN_NUMBERS = tuple(
+    field.name for field in fields(GunParameters) if isinstance(field.default, float) or field.default is None
+)
+"""The numbers of a gun that a factor may change."""
+_OWN_NAMES = (*GUN_NUMBERS, TRAIN_INTERVAL, METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR)
+"""The names by which a factor does more than have a hand set something."""
 
 
 def _is_english(code: str) -> bool:
@@ -253,7 +263,7 @@ def _factor_problems(design: DesignConfig) -> Iterator[str]:
     if METHOD_FACTOR not in design.factors:
         yield f"factors.{METHOD_FACTOR} is missing: name the rendering method, one level if there is only one"
     for name, factor in design.factors.items():
-        found = (*_level_problems(name, factor), *_nesting_problems(design, factor))
+        found = (*_level_problems(name, factor), *_hand_problems(name, factor), *_nesting_problems(design, factor))
         yield from (f"factors.{name}: {problem}" for problem in found)
         if factor.between and name in (*design.order.session, *design.order.set, design.trial.compare):
             yield f"factors.{name}: between = true: it varies between people; take it out of order and trial"
@@ -276,6 +286,25 @@ def _level_problems(name: str, factor: FactorConfig) -> Iterator[str]:
         yield f"texts has no words for {', '.join(missing)}; give what is read out"
     if name != INSTRUCTION_FACTOR and factor.texts:
         yield "texts are of the factor `instruction`; use labels here"
+
+
+def _hand_problems(name: str, factor: FactorConfig) -> Iterator[str]:
+    """What a hand sets changes no shot: under a misspelt name of the gun's every trial would fire the same one."""
+    if name in _OWN_NAMES or {*map(shown_level, factor.all_levels)} <= {*factor.sets}:
+        return
+    words = isinstance(factor.all_levels[0], str)
+    if meant := [own for own in _OWN_NAMES if _is_meant(name, own, words=words)]:
+        yield f"did you mean {meant[0]}? What a hand sets needs `sets` for each of its levels, or another name"
+    elif not words and parted(name).unit in {parted(number).unit for number in DRIVEN}:
+        yield f"the gun has no such number; it has {', '.join(GUN_NUMBERS)}"
+
+
+def _is_meant(name: str, own: str, *, words: bool) -> bool:
+    """Whether a name differs from one of the language's own in case, plural, or in what follows a number's words."""
+    said = parted(name).words.lower()
+    if words:
+        return said.removesuffix("s") == own
+    return f"{said} ".startswith(f"{parted(own).words} ")
 
 
 def _nesting_problems(design: DesignConfig, factor: FactorConfig) -> Iterator[str]:

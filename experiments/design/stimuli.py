@@ -7,17 +7,17 @@ lab's own, is set by the experimenter's hand and confirmed; the model is told wh
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import cast
 
 from device.limits import Load
 from device.methods import Method, drive_of, rendering_of
-from device.parameters import GunParameters, VibrationParameters
+from device.parameters import VibrationParameters
 from device.words import Direction, Drive, LimitError, Shot
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
-from experiments.design.config import DesignConfig
+from experiments.design.config import GUN_NUMBERS, DesignConfig
 from experiments.design.contents import cells
 from experiments.design.language import (
     DIRECTION_FACTOR,
@@ -31,11 +31,7 @@ from experiments.design.language import (
 )
 from experiments.design.plan import CHOSEN, Condition, Trial
 from experiments.design.planning import groups
-from experiments.design.units import parted
 
-_GUN_NUMBERS = tuple(
-    field.name for field in fields(GunParameters) if isinstance(field.default, float) or field.default is None
-)
 _NOT_OF_A_SHOT = (METHOD_FACTOR, DIRECTION_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL)
 
 
@@ -181,15 +177,13 @@ def _numbers(design: DesignConfig, held: Mapping[str, Level]) -> dict[str, tuple
         if name in _NOT_OF_A_SHOT:
             continue
         own = design.factors[name].sets.get(shown_level(level), {})
-        if isinstance(level, float) and name in _GUN_NUMBERS:
+        if isinstance(level, float) and name in GUN_NUMBERS:
             own = {name: level, **own}
-        elif isinstance(level, float) and not own and _has_unit_of_the_gun(name):
-            raise ConfigError(f"factors.{name}: the gun has no such number; it has {', '.join(_GUN_NUMBERS)}")
         for key, value in own.items():
-            if key not in _GUN_NUMBERS:
+            if key not in GUN_NUMBERS:
                 raise ConfigError(
                     f"factors.{name}.sets.{shown_level(level)}.{key}: the gun has no such number; it has "
-                    f"{', '.join(_GUN_NUMBERS)}"
+                    f"{', '.join(GUN_NUMBERS)}"
                 )
             if key in found:
                 raise ConfigError(
@@ -197,11 +191,6 @@ def _numbers(design: DesignConfig, held: Mapping[str, Level]) -> dict[str, tuple
                 )
             found[key] = (name, value)
     return found
-
-
-def _has_unit_of_the_gun(name: str) -> bool:
-    """Whether a factor's name ends as the gun's numbers of a drive do: then it is most likely a misspelling of one."""
-    return parted(name).unit in {parted(number).unit for number in DRIVEN}
 
 
 def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], method: str) -> Method:
@@ -223,7 +212,7 @@ def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], metho
 
 def unchanged_methods(design: DesignConfig) -> tuple[str, ...]:
     """The methods that a design takes as the gun has them: all, or none where a factor changes its numbers."""
-    changed = any(name in _GUN_NUMBERS or factor.sets for name, factor in design.factors.items())
+    changed = any(name in GUN_NUMBERS or factor.sets for name, factor in design.factors.items())
     return () if changed else design.methods
 
 
@@ -297,7 +286,7 @@ def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> Condi
 
 def _beyond(design: DesignConfig, levels: Condition, why: str) -> ConfigError:
     """That a cell cannot be fired, at the key of the first factor that says a number of the gun; else of the method."""
-    numbers = (name for name, factor in design.factors.items() if name in _GUN_NUMBERS or factor.sets)
+    numbers = (name for name, factor in design.factors.items() if name in GUN_NUMBERS or factor.sets)
     return ConfigError(f"factors.{next(numbers, METHOD_FACTOR)}.levels: {shown_cell(levels)}: {why}")
 
 
