@@ -102,6 +102,19 @@ def asked(**keys):
         ({"questions": asked(keys={"first": "x", "second": "x"})}, "'x' stands for more than one answer"),
         ({"questions": asked(keys={"first": "F1"})}, "questions.q.keys.first = 'F1'"),
         ({"questions": asked(labels={"first": "one", "second": "one"})}, "'one' stands for more than one answer"),
+        ({"questions": asked(labels={"first": "second"})}, "'second' stands for more than one answer"),
+        (
+            {"factors": ONE | {"grip": {"levels": ["one", "two"], "labels": {"one": "firm", "two": "firm"}}}},
+            "factors.grip.labels: 'firm' stands for more than one level",
+        ),
+        (
+            {"factors": ONE | {"grip": {"levels": ["one", "two"], "labels": {"one": "two"}}}},
+            "'two' stands for more than one level",
+        ),
+        (
+            {"factors": VOLTS | {"voltage_V": {"levels": [12.0, 20.0], "labels": {"12": "20"}}}},
+            "'20' stands for more than one level",
+        ),
         ({"questions": asked(text="")}, "questions.q.text"),
         ({"questions": asked(correct="weather")}, "correct = 'weather' is no factor"),
         ({"questions": asked(correct="method")}, "its levels a are not all among the answers"),
@@ -190,3 +203,11 @@ def test_the_steps_of_a_number_are_held_against_its_ends_where_it_has_two() -> N
     QuestionConfig(kind="number", text="How strong?", minimum=0.0, grain=3.0)
     with pytest.raises(ValidationError, match="grain 3 does not divide the scale 0 to 10"):
         QuestionConfig(kind="number", text="How strong?", minimum=0.0, maximum=10.0, grain=3.0)
+
+
+def test_levels_of_different_methods_may_be_called_alike() -> None:
+    nested = {"levels": {"a": [12.0, 14.0], "b": [16.0, 18.0]}, "within": "method"}
+    called = {"12": "low", "14": "high", "16": "low", "18": "high"}
+    config = design(factors={"method": {"levels": ["a", "b"]}, "voltage_V": nested | {"labels": called}})
+    voltage = config.factors["voltage_V"]
+    assert [voltage.label(level) for level in voltage.all_levels] == ["low", "high"] * 2

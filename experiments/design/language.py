@@ -6,7 +6,7 @@ What a table can tell by itself is checked here; what two must agree on, where t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
@@ -144,7 +144,7 @@ class FactorConfig(Model):
         return self
 
     @model_validator(mode="after")
-    def _tables_are_of_levels(self) -> Self:
+    def _names_are_of_levels(self) -> Self:
         known = {shown_level(level) for level in self.all_levels}
         named = {"labels": tuple(self.labels), "texts": tuple(self.texts), "sets": tuple(self.sets)}
         for key, names in named.items():
@@ -153,15 +153,22 @@ class FactorConfig(Model):
                     raise ValueError(
                         f"{key} has {name!r}, which is no level; the levels are {', '.join(sorted(known))}"
                     )
+        for levels in self._lists:
+            for problem in _doubled("labels", [self.label(level) for level in levels], "level"):
+                raise ValueError(problem)
         return self
+
+    @property
+    def _lists(self) -> list[Levels]:
+        """The levels, a list for each level of the factor that this one is nested in."""
+        if isinstance(self.levels, EvenLevels):
+            return [self.levels.levels]
+        return [*self.levels.values()] if isinstance(self.levels, dict) else [self.levels]
 
     @property
     def all_levels(self) -> Levels:
         """Every level once, in the order of the file."""
-        if isinstance(self.levels, EvenLevels):
-            return self.levels.levels
-        lists = self.levels.values() if isinstance(self.levels, dict) else [self.levels]
-        return tuple(dict.fromkeys(level for one in lists for level in one))
+        return tuple(dict.fromkeys(level for one in self._lists for level in one))
 
     def levels_within(self, outer: Level | None) -> Levels:
         """The levels that there are, in the outer factor's level if it is nested."""
@@ -361,7 +368,8 @@ def _answer_problems(question: QuestionConfig) -> Iterator[str]:
         unknown = [name for name in table if name not in named]
         if unknown:
             yield f"{key} has {', '.join(unknown)}, which is no answer; the answers are {', '.join(named)}"
-        yield from _doubled(key, table)
+    yield from _doubled("labels", [question.label(name) for name in named], "answer")
+    yield from _doubled("keys", [*question.keys.values()], "answer")
 
 
 def _number_problems(question: QuestionConfig) -> Iterator[str]:
@@ -376,10 +384,10 @@ def _number_problems(question: QuestionConfig) -> Iterator[str]:
         yield from _grain_problems(low, high, grain)
 
 
-def _doubled(key: str, table: Mapping[str, str]) -> Iterator[str]:
-    doubled = sorted({value for value in table.values() if list(table.values()).count(value) > 1})
+def _doubled(key: str, values: Sequence[str], of: str) -> Iterator[str]:
+    doubled = sorted({value for value in values if values.count(value) > 1})
     if doubled:
-        yield f"{key}: {', '.join(map(repr, doubled))} stands for more than one answer; give each its own"
+        yield f"{key}: {', '.join(map(repr, doubled))} stands for more than one {of}; give each its own"
 
 
 def _scale_problems(minimum: float | None, maximum: float | None, grain: float | None) -> Iterator[str]:
