@@ -223,3 +223,8 @@ def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int,
 
 _ENOUGH_SHOTS = 2 * MAX_SHOTS_PER_MINUTE
 """A train that keeps the limits for so long keeps them for ever, but for the coil, which is warm by then as well."""
+
+
+def language_key(setup: Setup[DesignConfig]) -> str:
+    """What the design says of its texts' language, behind file and line."""
+    return at_key(setup.source, f"language = {setup.config.language!r}")

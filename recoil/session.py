@@ -22,6 +22,7 @@ from experiments.design.plan import Plan
 from experiments.design.shown_texts import letters_of
 from experiments.earlier_run import begun_language, language_begun_in
 from experiments.live_run import RunStopped, Screen
+from experiments.load import language_key
 from experiments.rebuild import rebuild, rows_beyond, shots_table
 from experiments.record import replay, storage
 from experiments.record.journal import begun
@@ -45,10 +46,11 @@ class LanguageOptions:
     folder: Path | None = None
     unchecked: bool = False
 
-    def language(self, code: str) -> Language:
-        """A language that may be used. `ConfigError`: there is none, or nobody has checked it."""
-        found = language(code, self.folder)
-        check_allowed(found, unchecked=self.unchecked)
+    def language(self, setup: Setup[DesignConfig]) -> Language:
+        """That which was asked for, else that of a design. `ConfigError`: there is none, or nobody has checked it."""
+        code, asked = (setup.config.language, language_key(setup)) if self.code is None else (self.code, "")
+        found = language(code, self.folder, asked)
+        check_allowed(found, asked, unchecked=self.unchecked)
         return found
 
     def usable(self, say: Callable[[str], None]) -> tuple[Language, ...]:
@@ -159,11 +161,9 @@ def _language(request: RunRequest, wanted: LanguageOptions) -> Language:
     That nobody has checked it was accepted when the run began, if its journal says so.
     """
     began = language_begun_in(request) if request.again == "resume" else None
-    own = request.setup.config.language if began is None else began.code
-    code = own if wanted.code is None else wanted.code
-    if began is None or began.code != code:
-        return wanted.language(code)
-    found = begun_language(code, wanted.folder)
+    if began is None or wanted.code not in (None, began.code):
+        return wanted.language(request.setup)
+    found = begun_language(began.code, wanted.folder)
     if began.checked_by:
         check_allowed(found, unchecked=wanted.unchecked)
     return found
@@ -249,8 +249,7 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
             "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"
         )
     check_pace("console", request.gun)
-    code = request.setup.config.language if wanted.code is None else wanted.code
-    request = replace(request, language=wanted.language(code), catalogues=wanted.folder)
+    request = replace(request, language=wanted.language(request.setup), catalogues=wanted.folder)
     _say_beforehand(request)
     with _needs_gui():
         from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow

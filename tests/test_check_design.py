@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import pytest
 
@@ -105,6 +106,13 @@ def test_a_stated_duration_far_from_the_plan_is_a_warning_either_way(tmp_path):
         place.mkdir()
         told = check(written(place, "voltages", ("planned_s = 1800.0", f"planned_s = {stated}")), None, 1)
         assert any("which is what participants are told" in one for one in told.warnings)
+
+
+def test_a_language_without_a_catalogue_is_a_warning_with_its_line_before_anybody_comes_to_the_lab(tmp_path):
+    design = written(tmp_path, "voltages", ('gun = "gun.toml"', 'gun = "gun.toml"\nlanguage = "German"'))
+    (said,) = [one for one in check(design, None, 1).warnings if "language" in one]
+    assert re.search(r"voltages\.toml:\d+: language = 'German': no catalogue of that name; there are en, zh; ", said)
+    assert "--catalogues DIR then finds" in said
 
 
 def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_with_its_line(tmp_path):

@@ -42,7 +42,7 @@ from experiments.design.planning import plan_of
 from experiments.design.shown_texts import letters_of, setup_in, shown_texts, texts_in
 from experiments.doctor.checks import LanguageAsked, carry_out_check, checks
 from experiments.earlier_run import gone_on_with
-from experiments.load import load_setup
+from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import ShownLanguage, read_journal
 from experiments.run import run
 from experiments.run_request import RunRequest
@@ -198,6 +198,20 @@ def test_a_language_without_a_catalogue_is_refused_with_those_that_there_are(fol
         language("tlh", folder)
     with pytest.raises(ConfigError, match="no such folder"):
         language("zh", folder / "none")
+
+
+@pytest.mark.parametrize(("code", "why"), [("ar", "no catalogue of that name"), ("zh", "no native speaker has")])
+def test_a_run_whose_design_names_the_language_is_refused_with_the_designs_file_and_line(tmp_path, code, why):
+    path = tmp_path / "direction.toml"
+    text = (shipped_folder() / "direction.toml").read_text()
+    path.write_text(text.replace('gun = "gun.toml"', f'gun = "gun.toml"\nlanguage = "{code}"'))
+    for name in ("gun.toml", "synthetic"):
+        (tmp_path / name).symlink_to(shipped_folder() / name)
+    asked = RunRequest(setup=load_setup(str(path)), participant_id="S01", results=tmp_path, screen="synthetic")
+    with pytest.raises(ConfigError, match=rf"direction\.toml:\d+: language = '{code}': {why}"):
+        run_session(asked)
+    with pytest.raises(ConfigError, match=r"^--language tlh: no catalogue"):
+        run_session(asked, LanguageOptions(code="tlh"))
 
 
 def test_chinese_is_not_checked_and_says_so():

@@ -15,6 +15,7 @@ from analysis.report.serial import OPTIONAL, written
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
 from device.methods import Method
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse, how_many
+from experiments.catalogues.catalogue import language
 from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -33,7 +34,7 @@ from experiments.design.planned import (
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.design.procedures.config import PairingConfig
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
-from experiments.load import check_limits
+from experiments.load import check_limits, language_key
 from experiments.study.preregistration import FreezeStatus
 from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
@@ -114,13 +115,25 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         cells=tuple(_cell(setup, one) for one in cells),
         exposure=shaken,
         felt_forward_rates=_felt(setup, first),
-        warnings=(*_warnings(design, planned, [*plans.values()], cells, shaken), *_superfluous(setup)),
+        warnings=(
+            *_warnings(design, planned, [*plans.values()], cells, shaken),
+            *_without_catalogue(setup),
+            *_superfluous(setup),
+        ),
         assumed=(
             *design.assumed,
             *(f"{design.synthetic}: {key}" for key in getattr(setup.laws, "assumed", ())),
             *(f"{design.gun}: {key}" for key in setup.gun.assumed),
         ),
     )
+
+
+def _without_catalogue(setup: Setup[DesignConfig]) -> Iterator[str]:
+    """That no catalogue has the design's language; a lab's own, which a run can be given, is not known here."""
+    try:
+        language(setup.config.language, asked=language_key(setup))
+    except ConfigError as error:
+        yield str(error)
 
 
 def _superfluous(setup: Setup[DesignConfig]) -> Iterator[str]:

@@ -74,19 +74,21 @@ def languages(folder: Path | None = None) -> dict[str, Path | None]:
     return found
 
 
-def language(code: str, folder: Path | None = None) -> Language:
-    """A language by its code. `ConfigError`: there is none, or its catalogue cannot be used, and why."""
+def language(code: str, folder: Path | None = None, asked: str = "") -> Language:
+    """A language by its code. `ConfigError`: there is none, or its catalogue cannot be used, and why.
+
+    `asked`: where the code stands, if not behind `--language`.
+    """
     if folder is not None and not folder.is_dir():
         raise ConfigError(f"--catalogues {folder}: no such folder; it must hold LANGUAGE/LC_MESSAGES/{DOMAIN}.po")
     known = languages(folder)
     if not re.match(LANGUAGE_CODE, code):
-        raise ConfigError(
-            f"--language {code!r}: must be {PATTERNS[LANGUAGE_CODE]}; there are {', '.join(sorted(known))}"
-        )
+        place = asked or f"--language {code!r}"
+        raise ConfigError(f"{place}: must be {PATTERNS[LANGUAGE_CODE]}; there are {', '.join(sorted(known))}")
     if code not in known:
         where = "" if folder is None else f" here or in {folder}"
         raise ConfigError(
-            f"--language {code}: no catalogue of that name{where}; there are {', '.join(sorted(known))}; "
+            f"{asked or f'--language {code}'}: no catalogue of that name{where}; there are {', '.join(sorted(known))}; "
             "docs/howto/languages.md says how to make one, which --catalogues DIR then finds"
         )
     path = known[code]
@@ -97,12 +99,15 @@ def language(code: str, folder: Path | None = None) -> Language:
     return _read(code, path)
 
 
-def check_allowed(one: Language, *, unchecked: bool) -> None:
-    """`ConfigError`, if no native speaker has checked the language, and nobody said that it may be used so."""
+def check_allowed(one: Language, asked: str = "", *, unchecked: bool) -> None:
+    """`ConfigError`, if no native speaker has checked the language, and nobody said that it may be used so.
+
+    `asked` as of `language`.
+    """
     if not one.checked_by and not unchecked:
         raise ConfigError(
-            f"--language {one.code}: no native speaker has checked it ({CHECKED_BY} in the head of its .po names "
-            "nobody); have it checked, or add --unchecked: journal and report will say so"
+            f"{asked or f'--language {one.code}'}: no native speaker has checked it ({CHECKED_BY} in the head of its "
+            ".po names nobody); have it checked, or add --unchecked: journal and report will say so"
         )
 
 
