@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from experiments.config.door import ConfigError, StudyConfig, leaves, participant_codes
+from experiments.config.door import ConfigError, StudyConfig, leaves, participant_codes, tables
 from experiments.design.config import DesignConfig
 from experiments.design.planned import PlannedRun, planned_run
 from experiments.design.planning import plan_of
@@ -204,3 +204,28 @@ def test_a_seed_that_is_none_is_refused(seed: object) -> None:
 def test_a_prefix_that_makes_no_code_is_refused(prefix: str) -> None:
     with pytest.raises(ValidationError, match="code_prefix"):
         StudyConfig(title="t", participants=1, experiments=("direction.toml",), code_prefix=prefix)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = 1\nmean = 3,47\n", "some.toml:2: not TOML: "),
+        ("a = 1\nmean = 3,47\n", "a decimal comma? write 3.47"),
+        ("a = 1\nfeedback = no\n", "some.toml:2: not TOML: Invalid value (column 12); write true or false"),
+        ("feedback = True # always", "some.toml:1: not TOML: Invalid value (column 12); write true or false"),
+        ("may = [TRUE]", "write true or false"),
+        ("kind = yes-no", "some.toml:1: not TOML: Invalid value (column 8); put words in quotes"),
+        ("levels = [“on”, “off”]", "put words in straight quotes"),
+        ("share = .5", "write a digit before the point"),
+        ("pulse_s = 10 ms\n", "a unit? write 10 alone, in the unit that the key's name says"),
+        ("[order]\na = 1\n[order]\nb = 2", "some.toml:3: not TOML: the table [order] stands there twice"),
+        ("[questions.felt]\n[questions.felt]", "the table [questions.felt] stands there twice; put all of it into one"),
+        ("a = 1\na = 2\n", "some.toml:2: not TOML: a key or table of that name stands there already"),
+        ("a = 1\r\nb = no\r\n", "some.toml:2: not TOML: Invalid value (column 5); write true or false"),
+        ("a = [1", "some.toml: not TOML: Unclosed array (at end of document)"),
+    ],
+)
+def test_what_is_no_toml_is_told_with_its_line_and_what_to_write_instead(text: str, said: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        tables(text, "some.toml")
+    assert said in str(refused.value)

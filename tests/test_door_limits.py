@@ -26,7 +26,6 @@ BOMB, CAMEL = "(a+)+$", "a" * 5_000 + "!"
         ("x = " + "[" * 100 + "]" * 100, "too deep in each other"),
         ("x = " + "{a = " * 50 + "1" + "}" * 50, "too deep in each other"),
         ("#" * 1_000_001, "rule: at most 1000000"),
-        ("a = 1\nmean = 3,47", "a decimal comma? write 3.47"),
         ("a = " + "9" * 5_000, "not TOML"),
     ],
 )

@@ -54,7 +54,7 @@ def test_a_paper_without_claims_and_head_is_read_as_before(tmp_path: Path) -> No
         ('direction = "forward"', 'direction = "left"', ["direction.binomial.0.direction", "'left'", "forward"]),
         ('higher = "asymmetric-1"', 'higher = "ramp"', ["direction", "ramp above vibration", "two of"]),
         ("[participants]\nn = 14", "[participants]\nn = 0", ["participants.n", "0", "must be at least 1"]),
-        ("[participants]", "[participants", ["not TOML", "line"]),
+        ("[participants]", "[participants", ["paper.toml:12: not TOML"]),
     ],
 )
 def test_bad_input_is_one_message_with_file_key_value_and_rule(

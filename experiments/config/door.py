@@ -27,6 +27,7 @@ _TOO_DEEP = f"tables and lists lie too deep in each other (rule: at most {_DEEPE
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"""(?<![\w"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST}}}""")
 _DECIMAL_COMMA = re.compile(r"=\s*(-?\d+),(\d+)\b")
+_WITH_UNIT = re.compile(r"=\s*(-?\d+(?:\.\d+)?) *[^\W\d_]")
 
 
 class ConfigError(RecoilError):
@@ -72,8 +73,7 @@ def tables(text: str, source: Path | str) -> dict[str, Any]:
     try:
         found = tomllib.loads(text)
     except ValueError as error:  # also numbers beyond all reason
-        said = _no_digits(str(error))
-        raise ConfigError(f"{source}: not TOML: {said}{_comma(text, said)}") from error
+        raise ConfigError(_not_toml(str(error), text, source)) from error
     except RecursionError as error:
         raise ConfigError(f"{source}: {_TOO_DEEP}") from error
     if _is_deep(found):
@@ -81,9 +81,42 @@ def tables(text: str, source: Path | str) -> dict[str, Any]:
     return found
 
 
-def _no_digits(said: str) -> str:
-    """What the reader says of a text, but for advice on Python where a number has thousands of digits."""
-    return "a whole number has thousands of digits; write what is meant" if "digits" in said else said
+def _not_toml(said: str, text: str, source: Path | str) -> str:
+    """What the reader says of a text, behind its line as all messages are, and what to write instead."""
+    if "digits" in said:  # and how Python could be made to read them
+        return f"{source}: not TOML: a whole number has thousands of digits; write what is meant"
+    if "overwrite" in said:
+        said = f"a key or table of that name stands there already: {said}"
+    elif twice := _TWICE.search(said):
+        table = ".".join(re.findall(r"'([^']*)'", twice[0]))
+        said = said.replace(twice[0], f"the table [{table}] stands there twice; put all of it into one")
+    if (place := _PLACE.search(said)) is None:
+        return f"{source}: not TOML: {said}"
+    line, column = text.split("\n")[int(place[1]) - 1], int(place[2])
+    said = f"{said.removesuffix(place[0])} (column {column}){_advice(said, line, column)}"
+    return f"{source}:{place[1]}: not TOML: {said}"
+
+
+_PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
+_TWICE = re.compile(r"Cannot declare \(.*\) twice")
+_INSTEAD = {
+    r"(?i)(true|yes|on|false|no|off)(?=[\s,\]}#]|$)": "write true or false",
+    r"[“”„‘’«»]": 'put words in straight quotes, as in "off"',
+    r"[^\W\d]": 'put words in quotes, as in "off"',
+    r"[-+]?\.\d": "write a digit before the point, as in 0.5",
+}
+"""What is to be written where no value begins so."""
+
+
+def _advice(said: str, line: str, column: int) -> str:
+    """What to do about what is often written in a line and is no TOML."""
+    if said.startswith("Invalid value"):
+        found = (advice for start, advice in _INSTEAD.items() if re.match(start, line[column - 1 :]))
+        return "".join(f"; {advice}" for advice in [*found][:1])
+    comma, unit = _DECIMAL_COMMA.search(line), _WITH_UNIT.search(line)
+    if comma:
+        return f"; a decimal comma? write {comma[1]}.{comma[2]}"
+    return f"; a unit? write {unit[1]} alone, in the unit that the key's name says" if unit else ""
 
 
 def _check_size(text: str, source: Path | str) -> None:
@@ -106,13 +139,6 @@ def _is_deep(value: object) -> bool:
             for inner in (one.values() if isinstance(one, dict) else one)
         ]
     return bool(level)
-
-
-def _comma(text: str, said: str) -> str:
-    """What to do where a decimal comma may be what is no TOML."""
-    line = re.search(r"at line (\d+)", said)
-    found = _DECIMAL_COMMA.search(text.splitlines()[int(line[1]) - 1]) if line else None
-    return f"; a decimal comma? write {found[1]}.{found[2]}" if found else ""
 
 
 def checked(model: type[SomeModel], table: dict[str, Any], path: Path) -> SomeModel:
