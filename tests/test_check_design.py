@@ -15,7 +15,7 @@ from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate
 from experiments.config.door import ConfigError
 from experiments.load import shipped_folder
-from tests.designs import path_of
+from tests.designs import SHIPPED, path_of
 
 
 def found(name, people=14):
@@ -121,6 +121,15 @@ def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_
     assert "direction.toml:" in forward
     assert 'questions.response.share."asymmetric-2/forward": nobody meets that; direction has vibration/' in forward
     assert "asymmetric-2/backward" in backward
+
+
+def test_a_key_that_begins_a_word_of_another_answer_is_a_warning(tmp_path):
+    keys = 'answers = ["forward", "backward"]'
+    alike = 'labels = { forward = "a kick", backward = "a knock" }'
+    told = check(written(tmp_path, "voltages", (keys, f"{keys}\n{alike}")), None, 1).warnings
+    (warning,) = [one for one in told if one.startswith("questions.")]
+    assert "K is the key of “a kick”, and “a knock” has a word with K as well" in warning
+    assert not [one for name in SHIPPED for one in found(name).warnings if "is the key of" in one]
 
 
 def test_a_study_whose_papers_numbers_are_not_there_is_refused_with_the_line(tmp_path):

@@ -95,7 +95,7 @@ def table(folder: Path, name: str = "tiny") -> list[dict[str, str]]:
 def test_a_design_is_run_by_real_keys_from_consent_to_its_last_words(configs: Path, tmp_path: Path) -> None:
     run = words(configs, "tiny", "--participant", "P01")
     with virtual_display() as display, AtConsole(run, tmp_path, display) as screen:
-        screen.answer, screen.rating = (lambda trial: "d" if trial == 1 else "r"), (lambda trial: str(3 + trial))
+        screen.answer, screen.rating = (lambda trial: "e" if trial == 1 else "r"), (lambda trial: str(3 + trial))
         screen.stands(RUN)
         look = screen.at("informing")
         assert any("consent" in text for text in look.texts), look.texts
@@ -162,7 +162,7 @@ def test_keys_of_the_participants_own_that_are_the_consoles_are_refused(configs:
     design = configs / "tiny.toml"
     check_own_keys(load_setup(str(design)))
     design.write_text(design.read_text().replace('keys = { first = "left", second = "right" }', ""))
-    with pytest.raises(PlaceError, match=r"tiny.toml: questions.stronger: d, r would .* keys = \{ first = \"left"):
+    with pytest.raises(PlaceError, match=r"tiny.toml: questions.stronger: e, r would .* keys = \{ first = \"left"):
         check_own_keys(load_setup(str(design)))
 
 
@@ -271,10 +271,10 @@ def test_what_is_told_of_an_answer_follows_its_correction_but_for_an_emergency_s
     (configs / "tiny.toml").write_text(plain)
     run = words(configs, "tiny", "--participant", "P01")
     with virtual_display() as display, AtConsole(run, tmp_path, display) as screen:
-        screen.answer = lambda _: "d"
+        screen.answer = lambda _: "e"
         screen.stands(RUN)
         screen.to("asking", 1)
-        screen.keys.press("d")
+        screen.keys.press("e")
         first = screen.until(lambda look: look.state == "informing" and look.ready)
         other = "That was wrong." if first.says("That was right.") else "That was right."
         screen.keys.press("u")
@@ -286,7 +286,7 @@ def test_what_is_told_of_an_answer_follows_its_correction_but_for_an_emergency_s
         halted = screen.until(lambda look: look.state == "halted")
         screen.keys.press("u", "Control_L")
         screen.until(lambda look: look.state == "correcting")
-        screen.keys.press("d")
+        screen.keys.press("e")
         screen.until(lambda look: look.state == "halted" and look.serial > halted.serial)
         assert screen.process.poll() is None
         screen.kill()

@@ -44,6 +44,26 @@ def test_keys_follow_the_labels_and_the_owner():
     assert questions.answer_keys(japanese) == {"forward": "1", "backward": "2"}
 
 
+def labelled(*labels):
+    """The experimenter's keys of answers with these labels, one a letter."""
+    names = tuple(f"a{place}" for place in range(len(labels)))
+    asked = QuestionConfig(kind="choice", text="?", answers=names, labels=dict(zip(names, labels, strict=True)))
+    return "".join(one.key for one in questions.choices(asked))
+
+
+def test_a_key_is_of_the_word_that_tells_an_answer_from_the_others_and_never_of_an_article():
+    assert labelled("a kick", "a push", "the buzz", "an echo") == "kpbe"
+    assert labelled("X was A", "X was B") == "ab"
+    assert labelled("a little stronger", "a little weaker") == "sw"
+    assert labelled("a", "the") == "at"
+
+
+def test_no_key_is_given_to_one_answer_that_begins_a_word_of_another_if_there_is_a_better_one():
+    assert labelled("a kick", "a knock", "a push", "a tap", "a buzz", "nothing") == "koptbn"
+    assert labelled("0", "1", "2", "10") == "0123"  # of levels by number each has its own
+    assert labelled("12 V", "16 V", "20 V") == "162"
+
+
 @pytest.mark.parametrize(
     ("kind", "standard", "correct", "answers"),
     [

@@ -39,6 +39,7 @@ from experiments.study.preregistration import FreezeStatus
 from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
+from experiments.tasks.questions import mistaken_keys
 
 _MOST_CELLS = 40
 """So many cells are listed."""
@@ -227,6 +228,7 @@ def _warnings(
     design: DesignConfig, planned: PlannedRun, plans: Sequence[Plan], cells: Sequence[ConditionLimits], shaken: Exposure
 ) -> Iterator[str]:
     yield from warnings(design, planned)
+    yield from _key_warnings(design)
     if shaken.a8_m_s2 > shaken.action_m_s2:
         yield (
             f"the vibration of {shaken.a8_m_s2:.2f} m/s² A(8) exceeds the action value of {shaken.action_m_s2:g} of "
@@ -243,6 +245,17 @@ def _warnings(
             yield (
                 f"chance leaves the first session uneven over {len(plans)} participants ({said}); "
                 'order.sessions = "latin-square" or "williams" balances it'
+            )
+
+
+def _key_warnings(design: DesignConfig) -> Iterator[str]:
+    """Keys of the experimenter's that could be pressed for another answer, which would be stored without a word."""
+    for name, question in design.questions.items():
+        for heard, pressed in mistaken_keys(question):
+            key = pressed.key.upper()
+            yield (
+                f"questions.{name}: {key} is the key of “{pressed.label}”, and “{heard.label}” has a word with {key} "
+                "as well: whoever hears it may press the wrong key; label them with words that begin otherwise"
             )
 
 

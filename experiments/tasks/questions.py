@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from string import ascii_lowercase, digits
 from typing import Protocol
@@ -69,23 +70,64 @@ CONFIRMS = "m"
 """The experimenter's key that says that the damper is set: no answer has it, as a second press would say so as well."""
 
 
+_ARTICLES = frozenset(["a", "an", "the"])
+
+
 def free_keys(labels: Mapping[str, str], given: Mapping[str, str], *, reserved: str = "") -> dict[str, str]:
     """A key for each answer: the one given, or the first letter of its label that is free, or a digit.
 
+    That of the first word that tells it from the others and is no article; then letters that begin no other's word.
+
     >>> free_keys({"fast": "fast", "faster": "faster", "1": "№"}, {"fast": "x"})
     {'fast': 'x', 'faster': 'f', '1': '1'}
+    >>> free_keys({"kick": "a kick", "knock": "a knock", "nothing": "nothing"}, {})
+    {'kick': 'k', 'knock': 'o', 'nothing': 'n'}
     """
     keys = dict(given)
     for answer, label in labels.items():
         if answer not in keys:
-            letters = [letter for letter in label.casefold() if letter in ascii_lowercase]
+            others = {word for other in labels.values() if other != label for word in _words(other)}
             taken = {*keys.values(), *reserved}
-            keys[answer] = next(key for key in (*letters, *digits[1:], *ascii_lowercase) if key not in taken)
+            keys[answer] = next(key for key in _wished(_words(label), others) if key not in taken)
     return {answer: keys[answer] for answer in labels}
 
 
+def _wished(words: Sequence[str], others: Set[str]) -> Iterator[str]:
+    """The keys that an answer could have, the best first: its words, and those of the other answers."""
+    own = [word for word in words if word not in others] or words
+    told = [word for word in own if len(word) > 1 and word not in _ARTICLES] or own
+    letters = [letter for word in (*told, *words) for letter in word if letter in _TYPED]
+    begun = {word[0] for word in others}
+    yield from letters[:1]
+    yield from (key for key in (*letters, *_DIGITS, *ascii_lowercase) if key not in begun)
+    yield from (*_DIGITS, *ascii_lowercase)
+
+
+_TYPED, _DIGITS = ascii_lowercase + digits, digits[1:]
+
+
+def _words(label: str) -> list[str]:
+    return re.findall(r"[^\W_]+", label.casefold())
+
+
+def mistaken_keys(question: QuestionConfig) -> list[tuple[Choice, Choice]]:
+    """Answers, each with one whose key it could be taken to have: the key begins a word of its label.
+
+    >>> ways = QuestionConfig(kind="choice", text="?", answers=("kick", "knock", "tap"))
+    >>> [(heard.label, pressed.label) for heard, pressed in mistaken_keys(ways)]
+    [('knock', 'kick')]
+    """
+    every = choices(question)
+    return [
+        (heard, pressed)
+        for heard in every
+        for pressed in every
+        if heard != pressed and any(word.startswith(pressed.key) for word in _words(heard.label))
+    ]
+
+
 def answer_keys(question: QuestionConfig) -> dict[str, str]:
-    """The participant's key for each answer: its own, or the first letter of its label that is free, or a digit.
+    """The participant's key for each answer: its own, or one by `free_keys`.
 
     >>> q = QuestionConfig(kind="choice", text="?", answers=("f", "b"), labels={"f": "vorwärts", "b": "rückwärts"})
     >>> answer_keys(q)
