@@ -116,13 +116,15 @@ def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
     yield from (told[name] for name in names)
     if by_chance is not None:
         yield f"each condition against chance ({by_chance:g}) by an exact binomial test over all answers"
+    elif question.correct == "stimulus" and not held:
+        yield "hits of each condition, and correct rejections, with their exact 95 % intervals over all answers"
     if not (names or held) and by_chance is None:
         yield "it is described, not tested"
 
 
 def _score(question: QuestionConfig) -> str:
     if question.correct is not None:
-        return "the share of right answers"
+        return "the share of hits" if question.correct == "stimulus" else "the share of right answers"
     if question.named_answers:
         return f"the share of “{question.named_answers[0]}”"
     return {"number": "the natural logarithm", "rating": "the rating", "ranking": "the rank"}.get(

@@ -125,7 +125,8 @@ def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> Que
 def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
     found, factors = question_scores(design, name, table), varied(design)
     scored, people = found.scored, found.people
-    cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, factors)))
+    apart = [*factors, *(["stimulus"] if "stimulus" in scored else [])]
+    cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, apart)))
     conditions = {_named_condition(some, factors): some for some in _conditions(found.real, factors) if factors}
     tests = (
         *tests_of_conditions(design, question, people, _groups(design, found.real)),
@@ -176,13 +177,14 @@ def varied(design: DesignConfig) -> list[str]:
 
 
 def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[ConditionSummary, ...]:
-    """The conditions in the order in which the design names its levels; without a level, last."""
+    """The conditions in the order in which the design names its levels; catch trials last."""
     compared = design.trial.compare or ""
 
-    def place(cell: ConditionSummary) -> list[int]:
+    def place(cell: ConditionSummary) -> tuple[bool, list[int]]:
         named = {f"{compared}_1": compared, f"{compared}_2": compared}
         levels = {name: design.factors[named.get(name, name)].all_levels for name in varied(design)}
-        return [some.index(cell.levels[name]) if name in cell.levels else len(some) for name, some in levels.items()]
+        found = [some.index(cell.levels[name]) if name in cell.levels else len(some) for name, some in levels.items()]
+        return bool(cell.catch), found
 
     return tuple(sorted(cells, key=place))
 
@@ -241,7 +243,7 @@ def answer_scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
 
 
 def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.DataFrame]:
-    """The rows of each condition in the order of their levels; catch trials, which have no level, come last."""
+    """The rows of each condition, in the order of their levels."""
     if not factors:
         yield from [scored] if len(scored) else []
         return
@@ -261,13 +263,16 @@ def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.Da
         mean=math.exp(mean) if question.kind == "number" and mean is not None else mean,
         sd=float(means.std(ddof=1)) if means.size > 1 else None,
         answers={one: int((rows[name] == one).sum()) for one in question.named_answers} or None,
+        catch=int(first["stimulus"]) == 0 if "stimulus" in rows else None,
     )
-    by_chance = chance(question)
-    if by_chance is None:
-        return described
-    right = int(rows["score"].sum())
-    test = binomial_test(right, len(rows), by_chance)
-    return replace(described, right=right, p=float(test.p), ci_low=float(test.ci_low), ci_high=float(test.ci_high))
+    return _with_right(described, int(rows["score"].sum()), chance(question)) if question.correct else described
+
+
+def _with_right(cell: ConditionSummary, right: int, by_chance: float | None) -> ConditionSummary:
+    """With so many right answers, their exact interval, and the exact test against chance, if there is one."""
+    test = binomial_test(right, cell.trials, 0.5 if by_chance is None else by_chance)  # the interval is the same
+    p = None if by_chance is None else float(test.p)
+    return replace(cell, right=right, p=p, ci_low=float(test.ci_low), ci_high=float(test.ci_high))
 
 
 def _complete(rows: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:

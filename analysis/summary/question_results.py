@@ -13,9 +13,12 @@ from experiments.design.language import Level
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionSummary:
-    """One condition. `mean` and `sd` over people (n - 1); of scored answers the count right against chance, exact.
+    """One condition. `mean` and `sd` over people (n - 1); of scored answers the count right with its exact interval.
 
-    `mean` of numbers is geometric, `sd` then that of their natural logarithms.
+    `p`: against chance, if there is one.
+
+    `mean` of numbers is geometric, `sd` then that of their natural logarithms. `catch`: whether these are the catch
+    trials, of which right answers are correct rejections, as those of the others are hits; without any, `None`.
     """
 
     levels: Mapping[str, Level]
@@ -28,6 +31,7 @@ class ConditionSummary:
     ci_low: float | None = None
     ci_high: float | None = None
     answers: Mapping[str, int] | None = field(default=None, metadata=OPTIONAL)
+    catch: bool | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +58,8 @@ class DesignTest:
 class QuestionSummary:
     """All that one question gave. `left_out`: who has no score in some condition, and so is in no test.
 
-    `chance`: how often who does not know is right; `None` where nothing is right. `preferred`: of pairs, how often each
+    `chance`: how often who does not know is right; `None` where nothing is right, or stimuli were to be detected.
+    `preferred`: of pairs, how often each
     level was chosen of all trials that had it. `scale`: what the ends of a rating or rank 1 mean. `thresholds`: the
     psychometric functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
     `held`: its share of successes is where a procedure held it, which chose the levels by the answers. `not_above_0`:
@@ -75,9 +80,14 @@ class QuestionSummary:
 
     @property
     def pictured(self) -> tuple[ConditionSummary, ...]:
-        """The conditions of its picture: of pairs each item, and no catch trials beside what has a level."""
+        """The conditions of its picture: of pairs each item, and no catch trials beside others."""
         cells = self.preferred or self.cells
-        return tuple(cell for cell in cells if cell.levels) or cells
+        return tuple(cell for cell in cells if not cell.catch) or cells
+
+    @property
+    def detected(self) -> bool:
+        """Whether stimuli were told from catch trials: right answers are hits, and there correct rejections."""
+        return self.chance is None and any(cell.right is not None for cell in self.cells)
 
     @property
     def compared(self) -> bool:

@@ -161,8 +161,12 @@ def _larger(trial: Trial) -> str | None:
 
 
 def chance(question: QuestionConfig) -> float | None:
-    """How often who does not know is right; `None` of a question that nothing is right for."""
-    return None if question.correct is None else 1.0 / len(question.named_answers)
+    """How often who does not know is right; `None` of a question that nothing is right for.
+
+    `None`, too, of stimuli and catch trials: who does not know says yes as often to the ones as to the others, and how
+    often that is, is theirs to choose.
+    """
+    return None if question.correct in {None, "stimulus"} else 1.0 / len(question.named_answers)
 
 
 class Scale(Protocol):

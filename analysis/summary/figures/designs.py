@@ -92,7 +92,7 @@ def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary
     if question.preferred:
         question = replace(question, cells=question.preferred)
     factor = _across(question)
-    cells = [cell for cell in question.cells if factor is None or factor in cell.levels]
+    cells = [cell for cell in question.pictured if factor is None or factor in cell.levels]
     places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
     numeric = all(isinstance(level, float) for level in places)
     series = _series(cells, factor, found)
@@ -199,7 +199,13 @@ def _numbered(value: float) -> str:
 
 def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
     scored = any(cell.right is not None for cell in question.cells)
-    share = "right [%]" if scored else "chosen [%]" if question.preferred else f"{name} [%]"
+    share = (
+        f"{'hits' if question.detected else 'right'} [%]"
+        if scored
+        else "chosen [%]"
+        if question.preferred
+        else f"{name} [%]"
+    )
     axes.set_ylabel(share if question.kind in ("choice", "yes-no") else name)
     axes.set_xlabel(factor_words(factor) if factor else "")
     axes.set_title(name, loc="left", fontweight="bold", parse_math=False)

@@ -80,14 +80,21 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
 
 
 def _cells_words(found: DesignSummary, question: QuestionSummary) -> str:
+    if question.detected and (rejected := [cell for cell in question.cells if cell.catch]):
+        hits = replace(question, cells=tuple(cell for cell in question.cells if not cell.catch))
+        told = "; ".join(f"{_condition(found, one)}: {_mean_and_spread(question, one)}" for one in rejected)
+        return " ".join([*([_spread_words(found, hits)] if hits.cells else []), f"Correct rejections, {told}."])
+    return _spread_words(found, question)
+
+
+def _spread_words(found: DesignSummary, question: QuestionSummary) -> str:
+    """Each condition's mean in a sentence, or of many the lowest and the highest."""
     cells = question.preferred or question.cells
-    shown = [f"{_condition(found, question, cell)}: {_mean_and_spread(question, cell)}" for cell in cells]
+    shown = [f"{_condition(found, cell)}: {_mean_and_spread(question, cell)}" for cell in cells]
     if len(shown) > _TOLD:
         ends = sorted(cells, key=lambda cell: (cell.mean is None, cell.mean or 0.0))
         ends = [cell for cell in ends if cell.mean is not None] or ends
-        low, high = (
-            f"{_mean_and_spread(question, cell)} ({_condition(found, question, cell)})" for cell in (ends[0], ends[-1])
-        )
+        low, high = (f"{_mean_and_spread(question, cell)} ({_condition(found, cell)})" for cell in (ends[0], ends[-1]))
         return f"{_mean_word(question)} of {len(cells)} conditions went from {low} to {high}."
     opening = "" if question.kind == "rating" else f"{_mean_word(question)}, "
     return f"{opening}{'; '.join(shown)}."
@@ -95,7 +102,7 @@ def _cells_words(found: DesignSummary, question: QuestionSummary) -> str:
 
 def _mean_word(question: QuestionSummary) -> str:
     if any(cell.right is not None for cell in question.cells):
-        return "right answers"
+        return "hits" if question.detected else "right answers"
     if question.preferred:
         return "chosen, in the mean over people"
     answers = tuple(next(iter(question.cells)).answers or ())
@@ -220,7 +227,7 @@ def lacking_conditions(found: DesignSummary) -> Iterator[str]:
 
 def _picture(name: str, found: DesignSummary) -> Picture:
     shown = {asked: question for asked, question in found.questions.items() if question.drawn}
-    scored = [question for question in shown.values() if question.chance is not None]
+    scored = [question for question in shown.values() if any(cell.right is not None for cell in question.cells)]
     parts = ["the exact 95 % interval of all trials together"] if scored else []
     parts += ["the SD between participants"] if len(scored) < len(shown) and found.n > 1 else []
     spread = f" Whiskers: {' of right answers, else '.join(parts)}." if parts else ""
@@ -235,15 +242,19 @@ _SPELLED_OUT = 12
 
 def _means(found: DesignSummary, question: QuestionSummary) -> str:
     cells = question.pictured
-    told = [f"{_condition(found, question, cell)} {_mean(question, cell)}" for cell in cells[:_SPELLED_OUT]]
+    told = [f"{_condition(found, cell)} {_mean(question, cell)}" for cell in cells[:_SPELLED_OUT]]
     more = len(cells) - len(told)
     return ", ".join(told) + (f" and {more} more conditions" if more else "")
 
 
-def _condition(found: DesignSummary, question: QuestionSummary, cell: ConditionSummary) -> str:
+_WITH_STIMULUS = "trials with a stimulus"
+
+
+def _condition(found: DesignSummary, cell: ConditionSummary) -> str:
     """The levels of a condition, by what they are called."""
-    levels = (display_name(found.label(name, level)) for name, level in cell.levels.items())
-    return ", ".join(levels) or ("catch trials" if len(question.cells) > 1 else "all trials")
+    levels = [display_name(found.label(name, level)) for name, level in cell.levels.items()]
+    rest = "catch trials" if cell.catch else "" if levels else _WITH_STIMULUS if cell.catch is False else "all trials"
+    return ", ".join(filter(None, [*levels, rest]))
 
 
 def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
@@ -272,11 +283,13 @@ def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> T
     factors = list(dict.fromkeys(factor for cell in question.cells for factor in cell.levels))
     scored = any(cell.right is not None for cell in question.cells)
     sd = {"number": "SD of ln", "choice": _SD_OF_SHARES, "yes-no": _SD_OF_SHARES}.get(question.kind, "SD")
-    last = ("95 % interval", "p against chance") if scored else (sd,)
+    last = ("95 % interval", *(["p against chance"] if question.chance is not None else [])) if scored else (sd,)
+    caught = any(cell.catch and set(factors) <= set(cell.levels) for cell in question.cells)
     answers = () if question.preferred is not None else tuple(next(iter(question.cells)).answers or ())
     rows = tuple(
         (
             *(_level(found, cell, factor) for factor in factors),
+            *(["catch trials" if cell.catch else _WITH_STIMULUS] if caught else []),
             str(cell.people),
             str(cell.trials),
             *(str((cell.answers or {})[answer]) for answer in answers),
@@ -287,7 +300,9 @@ def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> T
     )
     first = f"Share of {answers[0]}" if answers else "Chosen"
     mean = {"number": "Geometric mean", "choice": first, "yes-no": first}.get(question.kind, "Mean")
-    header = (*map(factor_words, factors), "People", "Trials", *answers, "Right" if scored else mean, *last)
+    right = "Hits (of catch trials: correct rejections)" if question.detected else "Right"
+    kind = ["Trials were"] if caught else []
+    header = (*map(factor_words, factors), *kind, "People", "Trials", *answers, right if scored else mean, *last)
     return Table(caption=f"{name} by condition", header=header, rows=rows)
 
 
@@ -299,8 +314,8 @@ def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) 
     if not scored:
         shares = question.kind in ("choice", "yes-no") and cell.sd is not None
         return (apa.number(100.0 * cell.sd, 1) if shares and cell.sd is not None else apa.number(cell.sd),)
-    low, high = apa.percent(cell.ci_low), apa.percent(cell.ci_high)
-    return f"{low} to {high}", apa.p_cell(cell.p)
+    interval = f"{apa.percent(cell.ci_low)} to {apa.percent(cell.ci_high)}"
+    return (interval, apa.p_cell(cell.p)) if question.chance is not None else (interval,)
 
 
 def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:

@@ -1,0 +1,95 @@
+"""What a report says of a design: sentences, tables and the words for a paper, of data whose numbers are known."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.summary.announced import sentences_of_tests
+from analysis.summary.designs import summarise
+from analysis.summary.results import StudyStatistics
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.designs import result_sentences, sections_of_designs
+from tests.designs import design
+
+VOLTS = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
+
+
+def tables_of(found):
+    (section, *_) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
+    return section.tables
+
+
+def detection(factors, **more):
+    question = {"kind": "yes-no", "text": "Felt?", "correct": "stimulus"}
+    return design(factors=factors, trial={"catch": 4}, questions={"felt": question}, **more)
+
+
+def answered(said):
+    """Rows of detection: of each (person, voltage, or `None` of a catch trial) so many yes of so many trials."""
+    rows = [
+        {"participant_id": person, "method": None if volts is None else "a", "voltage_V": volts, "felt": answer}
+        for (person, volts), (yes, trials) in said.items()
+        for answer in ["yes"] * yes + ["no"] * (trials - yes)
+    ]
+    table = pd.DataFrame(rows)
+    table["stimulus"] = table["method"].notna().astype(int)
+    return table.assign(correct=((table["felt"] == "yes") == (table["stimulus"] == 1)).astype(int))
+
+
+SAID = {
+    ("P1", 6.0): (1, 24),
+    ("P1", 10.0): (20, 24),
+    ("P1", None): (1, 12),
+    ("P2", 6.0): (4, 24),
+    ("P2", 10.0): (22, 24),
+    ("P2", None): (2, 12),
+}
+
+
+def test_hits_and_correct_rejections_have_intervals_and_are_held_against_no_chance():
+    found = summarise(detection(VOLTS), answered(SAID))
+    question = found.questions["felt"]
+    assert question.chance is None
+    told = [(cell.levels, cell.catch, cell.right, cell.trials, cell.p) for cell in question.cells]
+    assert told == [
+        ({"voltage_V": 6.0}, False, 5, 48, None),
+        ({"voltage_V": 10.0}, False, 42, 48, None),
+        ({}, True, 21, 24, None),
+    ]
+    for cell in question.cells:
+        exact = stats.binomtest(cell.right, cell.trials).proportion_ci()
+        assert (cell.ci_low, cell.ci_high) == pytest.approx((exact.low, exact.high), rel=1e-6)
+    by_condition = tables_of(found)[0]
+    assert "Hits (of catch trials: correct rejections)" in by_condition.header
+    assert "p against chance" not in by_condition.header
+    assert by_condition.rows[0] == ("6 V", "2", "48", "5", "43", "10.4 %", "3.5 % to 22.7 %")
+    assert by_condition.rows[-1][0] == "catch trials"
+    (said,) = result_sentences("test", found)
+    assert "hits, 6 V: 10.4 % (5 of 48); 10 V: 87.5 % (42 of 48). Correct rejections, catch trials: 87.5 %" in said
+    (announced,) = sentences_of_tests(detection(VOLTS))
+    assert "chance" not in announced
+
+
+def test_catch_trials_stand_apart_where_nothing_else_varies():
+    said = {pair: counts for pair, counts in SAID.items() if pair[1] != 6.0}
+    found = summarise(detection({"method": {"levels": ["a"]}}), answered(said))
+    assert [(cell.catch, cell.right, cell.trials) for cell in found.questions["felt"].cells] == [
+        (False, 42, 48),
+        (True, 21, 24),
+    ]
+    (by_condition, _) = tables_of(found)
+    assert [row[0] for row in by_condition.rows] == ["trials with a stimulus", "catch trials"]
+    (sentence,) = result_sentences("test", found)
+    assert "hits, trials with a stimulus: 87.5 % (42 of 48). Correct rejections, catch trials: 87.5 %" in sentence
+
+
+def test_what_is_right_of_a_choice_is_held_against_chance_still():
+    volts = {"direction": {"levels": ["forward", "backward"]}, "method": {"levels": ["a"]}}
+    question = {"kind": "choice", "text": "?", "answers": ["forward", "backward"], "correct": "direction"}
+    table = pd.DataFrame({"participant_id": ["P1"] * 4, "method": "a", "direction": ["forward", "backward"] * 2})
+    table = table.assign(q="forward", correct=[1, 0, 1, 0])
+    found = summarise(design(factors=volts, questions={"q": question}), table)
+    assert found.questions["q"].chance == 0.5
+    assert "p against chance" in tables_of(found)[0].header
