@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
+import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.summary.announced import sentences_of_tests
+from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
@@ -93,3 +97,40 @@ def test_what_is_right_of_a_choice_is_held_against_chance_still():
     found = summarise(design(factors=volts, questions={"q": question}), table)
     assert found.questions["q"].chance == 0.5
     assert "p against chance" in tables_of(found)[0].header
+
+
+def test_numbers_have_an_exponent_over_each_numeric_factor_also_beside_others():
+    volts, pulses = [14.0, 18.0], [0.004, 0.008, 0.016]
+    factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": volts}, "pulse_s": {"levels": pulses}}
+    config = design(factors=factors, questions={"q": {"kind": "number", "text": "?"}}, order={"repetitions": 2})
+    random = np.random.default_rng(3)
+    exponents = {"P1": 0.6, "P2": 0.9, "P3": 1.0, "P4": 1.5}
+    rows = [
+        (person, "a", volt, pulse, volt * pulse**power * math.exp(random.normal(0.0, 0.1)))
+        for person, power in exponents.items()
+        for volt, pulse, _ in itertools.product(volts, pulses, range(2))
+    ]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "voltage_V", "pulse_s", "q"])
+    found = summarise(config, table)
+    (test,) = [test for test in found.questions["q"].tests if test.name == "exponent"]
+    slopes = [np.polyfit(np.log(own["pulse_s"]), np.log(own["q"]), 1)[0] for _, own in table.groupby("participant_id")]
+    assert (test.effect, test.df) == ("pulse_s", (3,))  # two voltages are no power law
+    assert test.statistic == pytest.approx(np.mean(slopes), rel=1e-9)
+    half = stats.t.ppf(0.975, 3) * np.std(slopes, ddof=1) / 2
+    assert (test.ci_low, test.ci_high) == pytest.approx((np.mean(slopes) - half, np.mean(slopes) + half), rel=1e-9)
+    assert set(names_of_tests(config, config.questions["q"])) == {one.name for one in found.questions["q"].tests}
+    (said,) = result_sentences("test", found)
+    ends = f"[{test.ci_low:.2f}, {test.ci_high:.2f}]"
+    assert f"Power-law exponent over pulse in s: M = {test.statistic:.2f}, 95 % CI {ends}; against 0 p = " in said
+    assert "power law over pulse_s, tested against 0" in next(sentences_of_tests(config))
+
+
+def test_groups_of_people_do_not_hide_the_exponent_of_their_numbers():
+    factors = {"hand": {"levels": ["left", "right"], "between": True}, "pulse_s": {"levels": [0.004, 0.008, 0.016]}}
+    factors |= {"method": {"levels": ["a"]}}
+    config = design(factors=factors, questions={"q": {"kind": "number", "text": "?"}})
+    powers = {"P1": ("left", 0.5), "P2": ("left", 0.9), "P3": ("right", 1.0), "P4": ("right", 1.6)}
+    rows = [(p, hand, "a", s, 40 * s**power) for p, (hand, power) in powers.items() for s in (0.004, 0.008, 0.016)]
+    table = pd.DataFrame(rows, columns=["participant_id", "hand", "method", "pulse_s", "q"])
+    exponent = summarise(config, table).questions["q"].tests[0]
+    assert (exponent.name, exponent.statistic) == ("exponent", pytest.approx(1.0))

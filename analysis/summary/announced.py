@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from analysis.summary.design_tests import MOST_FACTORS, with_levels_of_their_own
+from analysis.summary.design_tests import MOST_FACTORS, has_exponent, with_levels_of_their_own
 from analysis.summary.designs import varied
 from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig
@@ -31,18 +31,23 @@ def _comparisons(design: DesignConfig, question: QuestionConfig) -> Iterator[Tes
     within = _within(design)
     if _is_described(design, question, within):
         return
+    if question.kind == "number" and _powers(design):
+        yield "exponent"
     if len(within) != 1 or (design.between and question.kind != "ranking"):
         yield "anova"
         return
     levels = design.factors[within[0]].all_levels
-    if question.kind == "number" and all(not isinstance(level, str) and level > 0 for level in levels):
-        yield "exponent"
     if question.kind != "ranking":
         yield "anova"
     if question.kind in {"rating", "ranking"}:
         yield "friedman"
     if question.kind != "ranking" and 2 < len(levels) <= MOST_COMPARED:
         yield "tukey"
+
+
+def _powers(design: DesignConfig) -> list[str]:
+    """The factors over which numbers have an exponent."""
+    return [name for name in _within(design) if has_exponent(design.factors[name].all_levels)]
 
 
 def _within(design: DesignConfig) -> list[str]:
@@ -94,11 +99,12 @@ def sentences_of_tests(design: DesignConfig) -> Iterator[str]:
 def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
     factors = " × ".join((*design.between, *_within(design)))
     several = len(_within(design)) != 1 or bool(design.between)
+    powers = " and over ".join(_powers(design))
     told: dict[TestName, str] = {
         "anova": f"{'an ANOVA with all interactions' if several else 'a one-way repeated-measures ANOVA'} of {factors}",
         "friedman": f"Friedman's test of {factors}",
         "tukey": "Tukey's HSD of all pairs with its pooled error term",
-        "exponent": f"the exponent of the power law over {factors}, tested against 0",
+        "exponent": f"the exponent of the power law over {powers}, tested against 0",
         "d_prime": "d′ of all answers together and of each condition",
         "criterion": "and the criterion",
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from analysis.stats.paired import friedman
 from analysis.summary.question_results import DesignTest
 from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig
-from experiments.design.language import QuestionConfig, shown_level
+from experiments.design.language import Level, QuestionConfig, shown_level
 
 
 def tests_of_conditions(
@@ -33,8 +33,8 @@ def tests_of_conditions(
     if why := _untested(design, question, people):
         yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
         return
-    if question.kind == "number" and len(names) == 1 and pd.api.types.is_numeric_dtype(people.columns.dtype):
-        yield from _exponent(names[0], people)
+    if question.kind == "number":
+        yield from _exponents(names, people)
     if len(names) == 1 and (group is None or question.kind == "ranking"):
         scores = people.to_numpy(dtype=np.float64)
         yield from _one_factor(names[0], scores, question)
@@ -137,15 +137,30 @@ def _pairs(scores: FloatArray, labels: Sequence[str], question: QuestionConfig) 
         )
 
 
-def _exponent(name: str, people: pd.DataFrame) -> Iterator[DesignTest]:
+def has_exponent(levels: Collection[Level]) -> bool:
+    """Whether there is a power law over a factor's levels: over at least three numbers above 0.
+
+    >>> has_exponent([1.0, 2.0, 4.0]), has_exponent([1.0, 2.0]), has_exponent([0.0, 1.0, 2.0]), has_exponent(["a"])
+    (True, False, False, False)
+    """
+    return len(levels) > 2 and all(isinstance(level, float) and level > 0 for level in levels)
+
+
+def _exponents(names: Sequence[str], people: pd.DataFrame) -> Iterator[DesignTest]:
+    """The exponent of each numeric factor within people, of the means over the levels of the others."""
+    for name in names:
+        means = people.T.groupby(level=name).mean().T
+        if has_exponent([*means.columns]):
+            yield _exponent(name, means)
+
+
+def _exponent(name: str, people: pd.DataFrame) -> DesignTest:
     """The mean exponent of the power law: each person's slope of log number over log level, tested against 0."""
     levels = people.columns.to_numpy(dtype=np.float64)
-    if not (levels > 0).all():
-        return
     slopes = np.polyfit(np.log(levels), people.to_numpy(dtype=np.float64).T, 1)[0]
     test = scipy.stats.ttest_1samp(slopes, 0.0)
     low, high = test.confidence_interval()
-    yield DesignTest(
+    return DesignTest(
         name="exponent",
         effect=name,
         statistic=float(slopes.mean()),

@@ -136,6 +136,7 @@ def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
             for test in pairs
         )
         yield f"Planned comparisons (Tukey's HSD): {told}."
+    yield from (_exponent_words(test, exact=exact) for test in question.tests if test.name == "exponent")
     d_prime = next((test for test in question.tests if test.name == "d_prime"), None)
     if d_prime is not None:
         yield f"All answers together gave d′ = {apa.number(d_prime.statistic)}."
@@ -161,6 +162,11 @@ def _sphericity(test: DesignTest, *, exact: bool = False) -> str:
 def _ranks_words(test: DesignTest, *, exact: bool) -> str:
     told = f"χ² = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
     return f"Friedman's test of {effect_words(test.effect)}: {told}."
+
+
+def _exponent_words(test: DesignTest, *, exact: bool) -> str:
+    told = f"M = {apa.number(test.statistic)}, 95 % CI {apa.interval(test.ci_low, test.ci_high)}"
+    return f"Power-law exponent over {effect_words(test.effect)}: {told}; against 0 {apa.p_value(test.p, exact=exact)}."
 
 
 _WITH_UNIT = re.compile(r"[A-Za-z]\w*_(?:V|s|N|A|ohm|m|kg|Hz)\b")
