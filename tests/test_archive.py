@@ -109,6 +109,28 @@ def test_every_run_of_the_study_is_named_with_what_became_of_it(made: tuple[Path
         assert words in said
 
 
+def test_the_archives_own_report_knows_whom_the_study_left_out(
+    made: tuple[Path, Path, Archived], tmp_path: Path
+) -> None:
+    from analysis.summary.analyze import Request, result_files
+
+    study, archive, _ = made
+    statistics = json.loads((archive / "analysis" / "statistics.json").read_bytes())
+    of_study = result_files(Request(paths=[study / "results"], out=tmp_path))["statistics.json"]
+    ours, theirs = (one["participation"]["experiments"] for one in (statistics, json.loads(of_study)))
+    assert (ours["direction"]["left_out"], ours["direction"]["begun"], ours["preference"]["left_out"]) == (2, 1, 2)
+    for experiment, counts in theirs.items():
+        assert {key: ours[experiment][key] for key in ("left_out", "begun")} == {
+            key: counts[key] for key in ("left_out", "begun")
+        }
+    reasons = {one["reason"] for one in statistics["excluded"] if one["participant"] == "P05"}
+    assert reasons == {"the participant was excluded; the reason stands in the study's register alone"}
+    report = (archive / "analysis" / "report.md").read_text()
+    assert "2 further participants were left out: 1 by hand, 1 for a log that could not be used." in report
+    assert "Preference: 1 participant left out: P05 (the participant was excluded; the reason" in report
+    assert "Nobody was left out" not in report
+
+
 def test_the_methods_section_says_who_was_simulated_and_what_other_setups_have_otherwise(
     made: tuple[Path, Path, Archived],
 ) -> None:

@@ -116,6 +116,7 @@ def export_archive(request: ArchiveRequest, track: Track = iter, progress: Progr
     entries = [*_entries(runs), *contents.left_out_entries(logs, members, unproven)]
     with placing.in_place(target, lambda: _free_target(request)) as part:
         _write_results(part, runs, members, free_text=request.free_text)
+        placing.write_file(part, CONTENTS, contents.contents_table(entries))
         _write_analysis(part, request, settings, pages.contents_section(entries), progress)
         _write_bids(part, request, settings, results)
         _write_pages(part, settings, entries, _designs(runs))
@@ -234,7 +235,6 @@ def _write_pages(
     page = pages.archive_page(settings.title, recoil_version(), entries, free_text=settings.free_text)
     placing.write_file(part, "README.md", page)
     placing.write_file(part, "METHODS.md", pages.methods(designs))
-    placing.write_file(part, CONTENTS, contents.contents_table(entries))
 
 
 def _designs(runs: Iterable[_Run]) -> list[ArchivedDesign]:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, get_args
 
+from analysis.logs.exclusions import FINISHED, TRUSTED, LeftOut
 from analysis.logs.files import Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import RunFile
-from analysis.logs.kinds import kept_out
+from analysis.logs.kinds import IN_REGISTER, kept_out
 from analysis.logs.reading import Logs
-from experiments.record import tables
+from experiments.record import storage, tables
 from experiments.record.tables import Column, DataKind
+from experiments.study.folders import PlaceError
 from experiments.study.study import Member
 
 CONTENTS = "contents.csv"
@@ -92,6 +96,42 @@ def left_out_entries(
     for code in members:
         if code not in seen:
             yield Entry(participant_id=code, experiment="", state="excluded" if code in excluded else "no run")
+
+
+_RULES: Mapping[EntryState, str] = {
+    "excluded": IN_REGISTER,
+    "begun": FINISHED,
+    "no journal": TRUSTED,
+    "broken": TRUSTED,
+}
+"""The states in which a run leaves somebody out, with the rule; practices, runs set aside and other kinds do not."""
+
+
+def left_out_in(folder: Path) -> tuple[LeftOut, ...]:
+    """Who of a study is not in its archive, by its list of runs; no more is said of why than there.
+
+    `PlaceError` if the list cannot be read.
+    """
+    path = folder / CONTENTS
+    try:
+        rows = [*csv.DictReader(storage.read_whole(path).decode().splitlines())]
+    except FileNotFoundError:
+        return ()
+    except (OSError, ValueError, csv.Error) as error:
+        raise PlaceError(f"{path}: cannot be read ({error})") from error
+    states = ((row, state) for row in rows for state in _RULES if row.get("state") == state)
+    found = (_as_left_out(row, state) for row, state in states if row.get("participant_id") and row.get("experiment"))
+    return tuple(dict.fromkeys(found))  # of a person and an experiment there may be several runs
+
+
+def _as_left_out(row: Mapping[str, str], state: EntryState) -> LeftOut:
+    return LeftOut(
+        experiment=row["experiment"],
+        participant=row["participant_id"],
+        reason=MEANINGS[state].removeprefix("left out: "),
+        rule=_RULES[state],
+        file=CONTENTS if _RULES[state] == TRUSTED else "",
+    )
 
 
 def _of_run(run: RunFile, state: EntryState, excluded: Collection[str]) -> Entry:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from analysis.archive import bids_export
+from analysis.archive.contents import left_out_in
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request
 from experiments.config.door import Model, Text, checked_table, read_text
@@ -35,7 +36,8 @@ def read_settings(folder: Path) -> ArchiveSettings:
 def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
     """The analysis that an archive holds, of the journals and tables in it.
 
-    Deviations from a preregistration need the study's files, dates and register: its own report lists them.
+    Whom the study left out it knows from the list of runs. Deviations from a preregistration need the study's files,
+    dates and register: its own report lists them.
     """
     rules, requests = folder / RULES_FILE, folder / REQUESTS_FILE
     return Request(
@@ -46,6 +48,7 @@ def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
         rules=rules if rules.is_file() else None,
         requests=requests if requests.is_file() else None,
         against_frozen=False,
+        left_out=left_out_in(folder),
     )
 
 

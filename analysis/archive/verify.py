@@ -128,7 +128,7 @@ def _made_again(folder: Path, place: Path, listed: Mapping[str, str], track: Tra
 def _is_source(path: str) -> bool:
     """Whether a file is one that all others are made from."""
     is_result = path.startswith(f"{RESULTS}/") and path.endswith((journal.ENDING, REGISTER_FILE))
-    return is_result or path in (making.RULES_FILE, making.REQUESTS_FILE)
+    return is_result or path in (CONTENTS, making.RULES_FILE, making.REQUESTS_FILE)
 
 
 def _results(place: Path, settings: ArchiveSettings, theirs: object, track: Track) -> Iterator[_Made]:

@@ -137,6 +137,8 @@ IN_NO_TEST = "a test takes who answered in every condition"
 """The rule that leaves somebody out of tests alone."""
 FINISHED = "a run is finished"
 """The rule that leaves out who has begun."""
+TRUSTED = "a log can be read and trusted"
+"""The rule that leaves out whose log is of no use."""
 
 
 def left_out_by_files(logs: Logs) -> tuple[LeftOut, ...]:
@@ -185,7 +187,7 @@ def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
         experiment=one.experiment,
         participant=logs.person(one.study, one.participant) if one.participant else "",
         reason=said,
-        rule=rule[1] if rule else "a log can be read and trusted",
+        rule=rule[1] if rule else TRUSTED,
         remedy=f"`{command[1]}`" if command else correct,
         file=name.as_posix(),
     )

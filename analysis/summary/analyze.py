@@ -11,7 +11,7 @@ from pydantic import JsonValue
 
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusion_rules import ExclusionEffect, Rules, apply_rules
-from analysis.logs.exclusions import by_study, left_out_by_files, log_remarks
+from analysis.logs.exclusions import LeftOut, by_study, left_out_by_files, log_remarks
 from analysis.logs.files import shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
@@ -49,7 +49,7 @@ class Request:
 
     `fits`: with the diffusion model fitted to response times, and psychometric functions to everybody. `title` of the
     report: what was read, unless given; `extra` sections of it stand behind the results. Unless `against_frozen`, no
-    deviation from a preregistration is looked for.
+    deviation from a preregistration is looked for. `left_out`: who is known to be left out though no log says so.
     """
 
     paths: Sequence[Path]
@@ -64,6 +64,7 @@ class Request:
     title: str = ""
     extra: tuple[Section, ...] = ()
     against_frozen: bool = True
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def files(self) -> AnalysisFiles:
@@ -201,9 +202,9 @@ def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:
     yield from map(str, logs.remarks)
 
 
-def with_everybody(statistics: StudyStatistics, logs: Logs) -> StudyStatistics:
-    """The statistics with whose logs could not be read among the excluded, and who is in which analysis."""
-    excluded = (*statistics.excluded, *left_out_by_files(logs))
+def with_everybody(statistics: StudyStatistics, logs: Logs, others: Sequence[LeftOut] = ()) -> StudyStatistics:
+    """The statistics with whose logs could not be read, and `others`, among the excluded; and who is in which."""
+    excluded = (*statistics.excluded, *left_out_by_files(logs), *others)
     found = participation(logs, who_is_analysed(statistics, logs), excluded)
     return replace(statistics, excluded=excluded, participation=found)
 
@@ -248,7 +249,7 @@ def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, 
         statistics, frozen = _with_frozen(statistics, used)
     return _Analysed(
         logs=used,
-        statistics=with_everybody(statistics, used),
+        statistics=with_everybody(statistics, used, () if apart else request.left_out),
         effect=effect,
         tables=result_tables(used, statistics.analysed),
         frozen=frozen,

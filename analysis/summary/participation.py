@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
-from analysis.logs.exclusions import IN_NO_TEST, LeftOut
+from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
 from device.words import how_many
@@ -70,7 +70,8 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
         if (who, experiment) in begun:
             return f"begun: {begun[who, experiment].far}"
         if (who, experiment) in why:
-            return f"left out: {why[who, experiment].reason}"
+            one = why[who, experiment]
+            return f"{'begun' if one.rule == FINISHED else 'left out'}: {one.reason}"
         return "not done" if (_study_of(who), experiment) in there else ""
 
     order = sorted(people, key=by_code)
