@@ -271,10 +271,13 @@ def test_an_entry_of_the_rules_that_means_somebody_in_data_of_one_kind_is_not_ca
     mixed: Path, tmp_path: Path
 ) -> None:
     listed = [(code, f'[[excluded]]\ncode = "{code}"\nreason = "a try"\n') for code in ("P02", "P77")]
-    (tmp_path / "rules.toml").write_text("".join(text for _, text in listed), encoding="utf-8")
+    of_study = '[[excluded]]\ncode = "P02"\nstudy = "oslo"\nreason = "a try"\n'
+    (tmp_path / "rules.toml").write_text("".join(text for _, text in listed) + of_study, encoding="utf-8")
     request = Request(paths=(mixed,), out=tmp_path / "out", rules=tmp_path / "rules.toml", include_synthetic=True)
     found = json.loads(result_files(request)["statistics.json"])
-    assert [one for one in found["warnings"] if "no log here" in one] == ["the rules exclude P77, who has no log here"]
+    nobody, nowhere = (one for one in found["warnings"] if "no log here" in one)
+    assert nobody == "the rules exclude P77, who has no log here"
+    assert nowhere.startswith("the rules exclude P02 of study 'oslo', who has no log here; studies here are ")
     assert "P02" in [one["participant"] for one in found["kept_apart"]["synthetic"]["excluded"]]
 
 

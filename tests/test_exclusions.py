@@ -129,6 +129,17 @@ def test_of_several_studies_the_one_that_is_named(tmp_path: Path) -> None:
     assert set(effect.logs.ratings["participant_id"]) == {"kyoto/P01", "kyoto/P02", "oslo/P01"}
 
 
+def test_an_entry_of_a_study_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
+    for number, site in enumerate(("kyoto", "oslo")):
+        write_study(tmp_path / site / "results", participants=2, seed=number + 1)
+    entry = '[[excluded]]\ncode = "P02"\nstudy = "results"\nreason = "left-handed"'
+    effect = apply_rules(read_logs([tmp_path]), _rules(tmp_path, entry))
+    assert (effect.excluded, effect.warnings) == (
+        (),
+        ("the rules exclude P02 of study 'results', who has no log here; studies here are kyoto, oslo",),
+    )
+
+
 def test_who_has_no_trial_left_is_listed(tmp_path: Path) -> None:
     write_study(tmp_path, participants=2)
     write_rows(ratings_path(tmp_path, "P02"), [row | {"flags": "noise"} for row in rating_rows("P02")])

@@ -299,11 +299,15 @@ def _codes(table: pd.DataFrame, listed: ExcludedCode) -> list[str]:
 
 
 def _idle(logs: Logs, rules: Rules) -> Iterator[str]:
-    """Entries that mean nobody: a code that is mistyped must not go unseen."""
+    """Entries that mean nobody: a code or a study that is mistyped must not go unseen."""
     there = [*_ruled(logs)]
+    studies = sorted({str(name) for one in there for name in one.table[STUDY].unique()})
     for listed in rules.excluded:
         if not any(_codes(one.table, listed) for one in there):
-            yield f"the rules exclude {listed.code}, who has no log here"
+            of_study, known = "", ""
+            if listed.study is not None:
+                of_study, known = f" of study {listed.study!r}", f"; studies here are {', '.join(studies)}"
+            yield f"the rules exclude {listed.code}{of_study}, who has no log here{known}"
     scored = (one.table for one in there if one.scored and METHOD_FACTOR in one.table)
     methods = {str(method) for table in scored for method in table[METHOD_FACTOR].dropna().unique()}
     for _, method in without_trials_of(rules, methods):

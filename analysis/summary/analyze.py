@@ -181,9 +181,10 @@ def _analysis(
 
 
 def _without_effect(parts: Sequence[_Analysed]) -> tuple[str, ...]:
-    """The entries of the rules that mean nobody in data of any kind."""
+    """The entries of the rules that mean nobody in data of any kind; behind a semicolon stands what these data have."""
     said = [one.effect.warnings for one in parts if one.effect is not None]
-    return tuple(warning for warning in said[0] if all(warning in some for some in said)) if said else ()
+    entries = [{warning.partition(";")[0] for warning in some} for some in said]
+    return tuple(one for one in said[0] if all(one.partition(";")[0] in some for some in entries)) if said else ()
 
 
 def _tables(parts: Sequence[_Analysed]) -> dict[str, bytes]:
