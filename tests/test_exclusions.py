@@ -69,7 +69,7 @@ def test_statistics_are_over_the_trials_and_people_that_are_kept(effect: Exclusi
 
 
 def test_who_says_always_the_same_is_left_out_with_rule_and_reason(effect: ExclusionEffect) -> None:
-    reason = "1 of the answers are the same (rule: at most 0.95)"
+    reason = "1 of the answers to 'response' are the same (rule: at most 0.95)"
     (found,) = effect.excluded
     assert (found.experiment, found.participant, found.reason) == ("direction", "P03", reason)
     assert (found.rule, found.remedy.split("`")[1]) == ("max_same_response_share", "max_same_response_share")
@@ -209,6 +209,7 @@ def test_who_says_the_same_to_every_trial_of_a_design_is_left_out_where_the_rule
     alone = _rules(tmp_path, "[participants]\nmax_same_response_share = 0.9\n")
     effect = apply_rules(replace(logs, designs=(replace(one, table=same),)), alone)
     assert [(gone.participant, gone.rule) for gone in effect.excluded] == [("P02", "max_same_response_share")]
+    assert effect.excluded[0].reason == "1 of the answers to 'stronger' are the same (rule: at most 0.9)"
 
 
 @pytest.mark.parametrize("name", ["pairs", "staircase", "stronger"])

@@ -276,7 +276,8 @@ def _too_uniform(kept: pd.DataFrame, name: str, most: float | None) -> Iterator[
     counts = said[name].astype(str).groupby([people, said[name].astype(str)]).size()
     same = counts.groupby(level=0).max() / counts.groupby(level=0).sum()
     for code, share in same[same > most].items():
-        yield str(code), "max_same_response_share", f"{share:.4g} of the answers are the same (rule: at most {most:g})"
+        same_said = f"{share:.4g} of the answers to {name!r} are the same (rule: at most {most:g})"
+        yield str(code), "max_same_response_share", same_said
 
 
 def _too_often_wrong(kept: pd.DataFrame, name: str, rule: AccuracyRule) -> Iterator[tuple[str, str, str]]:
