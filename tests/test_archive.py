@@ -143,6 +143,14 @@ def test_the_methods_section_says_who_was_simulated_and_what_other_setups_have_o
     assert not any(place in page for place in SECRET_PLACES)
 
 
+def test_the_methods_section_says_how_many_runs_were_stopped(made: tuple[Path, Path, Archived]) -> None:
+    page = (made[1] / "METHODS.md").read_text()
+    direction = [part for part in re.split(r"(?m)^# ", page) if "Experiment `direction`" in part]
+    counts = [re.findall(r"(\d) runs? w\w+ stopped before", part) for part in direction]
+    assert sum(int(count) for found in counts for count in found) == 2
+    assert page.count("the archive has what was answered up to there") == len([*filter(None, counts)])
+
+
 def test_what_a_sensor_measured_is_in_it_without_the_place_of_the_sensor(made: tuple[Path, Path, Archived]) -> None:
     study, archive, _ = made
     name = "results/sub-P03/sub-P03_task-preference_shots.csv"

@@ -21,6 +21,11 @@ from analysis.summary.sections.pictures import directions_picture
 from analysis.summary.sections.quality import quality_section
 from analysis.summary.sections.supplement import supplement_sections
 from experiments.clock import VirtualClock
+from experiments.load import load_setup
+from experiments.rebuild import rebuild
+from experiments.run import run
+from experiments.run_request import RunRequest
+from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from tests.log_files import TextRow, rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 
@@ -116,6 +121,24 @@ def test_each_person_is_left_out_once_in_plain_words_with_the_dropped_trials(
     assert "112 without an answer" in said
     assert "with a response time below 0.7 s" in said
     assert not any(word in said for word in ("min_kept_share", "drop_", "never together", "trusted", "synthetic"))
+
+
+def test_of_a_design_dropped_trials_and_stopped_runs_are_told_with_who_was_analysed(
+    tmp_path: Path, reported: Reported
+) -> None:
+    setup, results = load_setup("realism"), tmp_path / "study" / "results"
+    for code in ("P01", "P02", "P03"):
+        asked = RunRequest(setup=setup, participant_id=code, results=results, seed=1, screen="synthetic")
+        journal = run(asked, synthetic_screen, VirtualClock()).place.journal
+    assert "stopped" not in quotes(reported(results))
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[: len(lines) // 2]))
+    table, content, _ = rebuild(journal)
+    table.write_bytes(content)
+    (tmp_path / "rules.toml").write_text("[trials]\ndrop_unanswered = true\n")
+    said = quotes(reported(results, rules=tmp_path / "rules.toml"))
+    assert "The run of 1 of the 3 was stopped before its end; what was answered up to there is analysed." in said
+    assert "Of 36 recorded trials 6 (16.7 %) were dropped: 6 without an answer." in said
 
 
 def test_who_is_listed_by_hand_is_told_so_though_a_rule_would_leave_them_out(

@@ -260,6 +260,7 @@ def _design(runs: Sequence[_Run], setup: Files, first: Files) -> ArchivedDesign:
         participants=tuple(run.code for run in runs),
         spoken=tuple(run.contents.head.language for run in runs if run.contents.head.language is not None),
         synthetic=sum(run.kind == "synthetic" for run in runs),
+        stopped=sum(not run.contents.finished for run in runs),
         differs=setup_differences(first, setup),
     )
 

@@ -24,8 +24,8 @@ CITATION = "CITATION.cff"
 class ArchivedDesign:
     """A design with the gun that it ran on, who did it, and who of them in another language than the design's.
 
-    `synthetic`: of so many participants simulations answered; `differs`: what the setup has otherwise than the first of
-    its experiment.
+    `synthetic`: of so many participants simulations answered; `stopped`: the runs of so many did not come to their end;
+    `differs`: what the setup has otherwise than the first of its experiment.
     """
 
     design: DesignConfig
@@ -33,6 +33,7 @@ class ArchivedDesign:
     participants: tuple[str, ...]
     spoken: tuple[ShownLanguage, ...] = ()
     synthetic: int = 0
+    stopped: int = 0
     differs: str = ""
 
 
@@ -138,6 +139,11 @@ def _method(one: ArchivedDesign) -> Iterator[str]:
     people = how_many(len(one.participants), "participant")
     yield f"# {one.design.title}\n"
     yield f"Experiment `{one.design.design}`, {people}{_simulated(one)}; gun: {one.gun.title}.\n"
+    if one.stopped:
+        which = (
+            "1 run was stopped before its" if one.stopped == 1 else f"{one.stopped:,} runs were stopped before their"
+        )
+        yield f"{which} end; the archive has what was answered up to there.\n"
     if one.differs:
         yield f"What differs from the first setup of this experiment: {one.differs}.\n"
     for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun)):

@@ -21,6 +21,8 @@ from experiments.session.history import answered
 from experiments.study.folders import data_of
 
 RunKind = Literal["run", "practice", "set aside"]
+NOT_FINISHED = "its run is not finished"
+"""How the remark on a log begins whose run was stopped before its end."""
 _SUFFIXES = tuple(f"_{suffix}" for suffix in FILE_SUFFIX.values())
 
 
@@ -201,7 +203,7 @@ def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) 
         raise _edited(where, data, content, _differs(where, rows_beyond(content, made), finished=finished))
     if finished:
         return "its journal was changed and says the same as before"
-    return "its run is not finished; the table holds what was answered so far, and `recoil run ... --resume` goes on"
+    return f"{NOT_FINISHED}; the table holds what was answered so far, and `recoil run ... --resume` goes on"
 
 
 def _differs(where: str, beyond: int, *, finished: bool) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +12,8 @@ from pydantic import JsonValue
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusion_rules import ExclusionEffect, Rules, apply_rules
 from analysis.logs.exclusions import LeftOut, by_study, left_out_by_files, log_remarks
-from analysis.logs.files import shown_name
+from analysis.logs.files import Problem, shown_name
+from analysis.logs.journals import NOT_FINISHED
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.paper.paper import Paper, Prediction, load_paper
@@ -163,7 +164,7 @@ def _analysis(
         warnings=warnings,
         log_remarks=log_remarks(logs) or None,
     )
-    told = _told(main, files.mapping)
+    told = _told(main, files.mapping, logs.remarks)
     compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))
     report = replace(
         told,
@@ -175,7 +176,7 @@ def _analysis(
         beside=tuple(main.tables),
         provenance=provenance() | _read_by(request.columns, files.mapping),
         extra=(*request.extra, *told.extra),
-        apart=tuple(_told(one, files.mapping) for one in others),
+        apart=tuple(_told(one, files.mapping, logs.remarks) for one in others),
     )
     return report, (main, *others), edited
 
@@ -282,7 +283,7 @@ def _with_frozen(statistics: StudyStatistics, logs: Logs) -> tuple[StudyStatisti
     return replace(statistics, requested=tuple(found) or None, warnings=said), tuple(made)
 
 
-def _told(one: _Analysed, mapping: ColumnMap | None) -> ReportData:
+def _told(one: _Analysed, mapping: ColumnMap | None, remarks: Iterable[Problem]) -> ReportData:
     """What is told of data of one kind."""
     coded = one.statistics.remarks
     registered = ((one.logs.person(where, member.participant_id), member) for where, member in one.logs.joined)
@@ -296,8 +297,18 @@ def _told(one: _Analysed, mapping: ColumnMap | None) -> ReportData:
         rated_from=mapping.rated_from if mapping is not None and one.logs.mapped else None,
         members=dict(registered),
         analysed=who_is_analysed(one.statistics, one.logs),
+        stopped=_stopped(one.logs, remarks),
         delivered=() if one.logs.mapped else delivered_courses(one.logs.files),
     )
+
+
+def _stopped(logs: Logs, remarks: Iterable[Problem]) -> dict[str, frozenset[str]]:
+    """By experiment whose logs are of runs that were stopped before their end."""
+    found: dict[str, set[str]] = {}
+    for one in remarks:
+        if one.message.startswith(NOT_FINISHED):
+            found.setdefault(one.experiment, set()).add(logs.person(one.study, one.participant))
+    return {experiment: frozenset(people) for experiment, people in found.items()}
 
 
 def _predicted(paper: Path | None) -> dict[str, Prediction]:

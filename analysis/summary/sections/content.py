@@ -35,9 +35,10 @@ class ReportData:
     `provenance` is label -> text; `notes` are the assumptions behind the numbers, `dropped` what rules left out of
     trials; `extra` are finished sections that follow the results; the participants may be `reconstructed` from the
     published numbers. `planned`: the logs come with their plans, as those of other programs do not. `members` is what
-    the register says of people, `analysed` by experiment whose answers count. `apart`: the same of data of other kinds,
-    which are kept apart. `rated_from`: the ends of the scale of other programs' ratings, which became 0 and 10;
-    `None`: question and scale are Recoil's own. `delivered`: what sensors measured of the shots.
+    the register says of people, `analysed` by experiment whose answers count, `stopped` whose run was stopped before
+    its end. `apart`: the same of data of other kinds, which are kept apart. `rated_from`: the ends of the scale of
+    other programs' ratings, which became 0 and 10; `None`: question and scale are Recoil's own. `delivered`: what
+    sensors measured of the shots.
     """
 
     title: str
@@ -58,6 +59,7 @@ class ReportData:
     rated_from: tuple[float, float] | None = None
     members: Mapping[str, Member] = field(default_factory=dict)
     analysed: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    stopped: Mapping[str, frozenset[str]] = field(default_factory=dict)
     apart: tuple[ReportData, ...] = ()
     delivered: tuple[DeliveredCourse, ...] = ()
 

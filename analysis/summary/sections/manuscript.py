@@ -39,8 +39,7 @@ def manuscript_section(report: ReportData) -> Iterator[Section]:
 def _of_experiment(report: ReportData, name: str, found: WithinStatistics) -> Iterator[str]:
     title = EXPERIMENTS[name].capitalize()
     people = _people(report, name, found.people, found.participants.codes)
-    dropped = trials_dropped(report, name)
-    yield " ".join(filter(None, [f"{title}, participants and design. {people}", dropped, _design(report, found)]))
+    yield f"{title}, participants and design. {people} {_design(report, found)}"
     if found.anova is not None:
         yield f"{title}, analysis. {_analysis(found)}"
     pairs = pairs_sentence(found, name, full=True, planned=report.planned)
@@ -49,11 +48,27 @@ def _of_experiment(report: ReportData, name: str, found: WithinStatistics) -> It
 
 
 def _people(report: ReportData, name: str, people: str, codes: Sequence[str]) -> str:
-    """How many were analysed, who they were, and how many were not, for what reasons."""
+    """How many were analysed, who they were, and what of whom was not, for what reasons."""
     facts = [member.facts for code in codes if (member := report.members.get(code)) and member.facts]
     who = "; ".join(filter(None, [_ages(facts, len(codes)), *_levels(facts, len(codes))]))
     told = f"{people}{f' ({who})' if who else ''} {'was' if len(codes) == 1 else 'were'} analysed."
-    return f"{told} {people_left_out(report, name, frozenset(codes))}"
+    analysed = frozenset(codes)
+    stopped = _stopped(len(analysed & report.stopped.get(name, frozenset())), len(analysed))
+    return " ".join(
+        filter(None, [told, people_left_out(report, name, analysed), stopped, trials_dropped(report, name)])
+    )
+
+
+def _stopped(count: int, of: int) -> str:
+    """How many of the runs that are analysed did not come to their end.
+
+    >>> _stopped(2, 6)
+    'The runs of 2 of the 6 were stopped before their end; what was answered up to there is analysed.'
+    """
+    if not count:
+        return ""
+    runs = f"The run of 1 of the {of} was" if count == 1 else f"The runs of {count:,} of the {of:,} were"
+    return f"{runs} stopped before {'its' if count == 1 else 'their'} end; what was answered up to there is analysed."
 
 
 def _ages(facts: Iterable[Facts], n: int) -> str:
