@@ -131,11 +131,11 @@ def double(folder: Path) -> None:
     shutil.copytree(folder / "2", folder / "4")
 
 
-def another(**options: object) -> Callable[[Path], None]:
+def another(number: int = 3, **options: object) -> Callable[[Path], None]:
     def spoil(folder: Path) -> None:
         request = replace(SMALL, **options)  # type: ignore[arg-type]
-        (folder / "3/shard-3-of-3.json").unlink()
-        feature.power_shard(request, ShardNumber(number=3, of=3), folder / "3", unseen, workers=1)
+        (folder / f"{number}/shard-{number}-of-3.json").unlink()
+        feature.power_shard(request, ShardNumber(number=number, of=3), folder / f"{number}", unseen, workers=1)
 
     return spoil
 
@@ -187,6 +187,23 @@ def test_shards_that_do_not_make_one_run_are_named_and_nothing_is_written(fault:
     with pytest.raises(RecoilError, match=said):
         merge(mine)
     assert not (mine / "merged").exists()
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_the_shard_that_does_not_belong_is_named_and_none_that_does(number: int, mine: Path) -> None:
+    another(number, seed=2)(mine)
+    with pytest.raises(ConfigError) as refused:
+        merge(mine)
+    (said,) = str(refused.value).splitlines()
+    assert said.startswith(
+        f"{mine}/{number}/shard-{number}-of-3.json: is no shard of this job (seed 2, not 1), as 2 of 3 "
+    )
+
+
+def test_of_a_job_that_was_divided_twice_the_fewer_shards_are_named(mine: Path) -> None:
+    feature.power_shard(SMALL, ShardNumber(number=1, of=2), mine, unseen, workers=1)
+    with pytest.raises(ConfigError, match=r"^\S*/shard-1-of-2.json: is one of 2 shards, .*shard-1-of-3.json one of 3"):
+        merge(mine)
 
 
 def test_a_merge_for_other_options_than_those_of_the_shards_is_refused(mine: Path) -> None:

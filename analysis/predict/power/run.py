@@ -22,6 +22,7 @@ from analysis.predict.power.shards import (
     Job,
     Shard,
     ShardNumber,
+    most_common_job,
     read_shard,
     shard_number,
     shards_in,
@@ -100,11 +101,12 @@ def _already(path: Path, part: ShardNumber, job: Job) -> Shard | None:
 def merged_power(folder: Path, request: PowerRequest, out: Path) -> Power:
     """What all shards in a folder come to, written into `out` as `power` would have written it.
 
-    A request without a config means that of the shards; any other must be theirs. `ConfigError` names each shard that
-    is not whole, of another job, doubled or missing.
+    A request without a config means that of most of the shards; any other must be theirs. `ConfigError` names each
+    shard that is not whole, of another job, doubled or missing.
     """
     shards = shards_in(folder)
-    grid = make_grid(request) if request.config else _grid_of(*next(iter(shards.items())), request)
+    first = most_common_job(shards)
+    grid = make_grid(request) if request.config else _grid_of(first, shards[first], request)
     tallies = tallies_of(folder, shards, _job(grid))
     return _written(grid, tallies, out)
 

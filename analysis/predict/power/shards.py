@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import groupby
@@ -67,6 +68,12 @@ class Job:
     sha256: str
     request: PowerRequest
     provenance: Mapping[str, str]
+
+    @property
+    def key(self) -> str:
+        """The same for shards of one job."""
+        options = [getattr(self.request, one.name) for one in fields(PowerRequest) if one.name not in _FILES]
+        return repr((self.sha256, options, sorted(self.provenance.items())))
 
     def unlike(self, other: Job) -> str:
         """What sets this job apart from another, in words; nothing if they are the same."""
@@ -151,9 +158,16 @@ def _in_numbers(path: Path) -> tuple[list[int], str]:
     return [int(number) for number in re.findall(r"[0-9]+", path.name)], str(path)
 
 
+def most_common_job(shards: Mapping[Path, Shard]) -> Path:
+    """The first shard of the job that most of the shards are of."""
+    keys = {path: one.job.key for path, one in shards.items()}
+    most = Counter(keys.values()).most_common(1)[0][0]
+    return next(path for path, key in keys.items() if key == most)
+
+
 def tallies_of(folder: Path, shards: Mapping[Path, Shard], job: Job) -> dict[int, Tally]:
     """The tallies of all chunks of a job. `ConfigError` names each shard that is another's, doubled or missing."""
-    of = next(iter(shards.values())).part.of
+    of = Counter(one.part.of for one in shards.values()).most_common(1)[0][0]
     faults = (
         list(_others(shards, job))
         or list(_divided(shards, of))
@@ -166,15 +180,20 @@ def tallies_of(folder: Path, shards: Mapping[Path, Shard], job: Job) -> dict[int
 
 
 def _others(shards: Mapping[Path, Shard], job: Job) -> Iterator[str]:
-    for path, one in shards.items():
-        if differing := one.job.unlike(job):
-            yield f"{path}: is no shard of this job ({differing}); run it again as the job's others, or move it away"
+    differing = {path: one.job.unlike(job) for path, one in shards.items()}
+    own = [path for path, how in differing.items() if not how]
+    as_these = f", as {len(own):,} of {len(shards):,} here are ({own[0]} is the first)" if own else ""
+    remedy = "run it again as the job's others, or move it away"
+    yield from (
+        f"{path}: is no shard of this job ({how}){as_these}; {remedy}" for path, how in differing.items() if how
+    )
 
 
 def _divided(shards: Mapping[Path, Shard], of: int) -> Iterator[str]:
+    first = next(path for path, one in shards.items() if one.part.of == of)
     for path, one in shards.items():
         if one.part.of != of:
-            yield f"{path}: is one of {one.part.of} shards, {next(iter(shards))} one of {of}; move those of one away"
+            yield f"{path}: is one of {one.part.of} shards, {first} one of {of}; move those of one away"
 
 
 def _doubled(shards: Mapping[Path, Shard]) -> Iterator[str]:
