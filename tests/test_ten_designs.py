@@ -17,7 +17,7 @@ from experiments.session.steps import Asking, is_answer
 from experiments.synthetic.answers import SyntheticParticipant
 from experiments.synthetic.laws import SyntheticAnswers, check_laws
 from experiments.tasks.questions import is_right
-from tests.designs import path_of
+from tests.designs import changed, laws_of, path_of
 from tests.driven_designs import driven, session_of
 
 TRIALS = {
@@ -82,6 +82,16 @@ def test_a_psychometric_function_rises_from_chance_to_its_lapses():
     found = means("voltages", "response", lambda trial: trial.level("voltage_V"))
     assert found[6.0] == pytest.approx(0.5 + 0.48 * 0.041, abs=0.06)
     assert found[18.0] == pytest.approx(0.98, abs=0.03)
+
+
+def test_a_law_without_a_value_for_catch_trials_is_refused_with_what_they_are_called():
+    question = {"kind": "rating", "text": "How sure?", "minimum": 1.0, "maximum": 4.0, "grain": 1.0}
+    law = {"law": "ratings", "by": ("pulse_s",), "mean": {"0.003": 2.0, "0.004": 3.0, "0.005": 4.0}}
+    setup = changed("detection", {"questions": {"sure": law}}, questions={"sure": question})
+    with pytest.raises(
+        ConfigError, match=r"'all': so is called a trial without one pulse_s, such as a catch trial; it has 0\.003"
+    ):
+        check_laws(setup.config, laws_of(setup), [plan_of(setup.config, "P01", 1)])
 
 
 def test_catch_trials_are_falsely_felt_as_often_as_is_said():

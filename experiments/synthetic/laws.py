@@ -405,5 +405,7 @@ def of_condition(values: Mapping[str, OfCell], by: Sequence[str], levels: Condit
     """What a law's table has for the levels of a trial. `ConfigError`: nothing."""
     cell = cell_of(by, levels)
     if cell not in values:
-        raise ConfigError(f"{where} has no value for {cell!r}; it has {', '.join(values)}")
+        lacking = [name for name in by if name not in dict(levels)]
+        why = f": so is called a trial without one {' or '.join(lacking)}, such as a catch trial" if lacking else ""
+        raise ConfigError(f"{where} has no value for {cell!r}{why}; it has {', '.join(values)}")
     return values[cell]
