@@ -148,7 +148,28 @@ BROKEN = {
     ),
     "unknown direction": Broken(
         PREFERENCE, PREFERENCE, "[order]", '[factors.direction]\nlevels = ["up"]\n\n[order]',
-        ("factors.direction: levels up", "forward, backward"),
+        ("factors.direction: levels 'up': directions are forward, backward",), "[factors.direction]",
+    ),
+    "a blank behind a direction": Broken(
+        DIRECTION, DIRECTION, '"backward"]', '"backward "]',
+        ("factors.direction: levels 'backward '",), "[factors.direction]",
+    ),
+    "a session too long": Broken(
+        DIRECTION, DIRECTION, "repetitions = 10", "repetitions = 9000",
+        ("order.repetitions = 9000: a session of 18,000 trials is more than the 10,000",), "repetitions = 9000",
+    ),
+    "a question called as a column of another": Broken(
+        DIRECTION, DIRECTION, "[breaks]", '[questions.response_time_s]\nkind = "text"\ntext = "Why?"\n\n[breaks]',
+        ("questions.response_time_s: response_time_s would be two columns",), "[questions.response_time_s]",
+    ),
+    "a run without a name": Broken(
+        DIRECTION, DIRECTION, "repetitions = 10", "repetitions = 10\nlongest_run = 2",
+        ("order.longest_run = 2: must be a table, such as { NAME = 2 }",), "longest_run",
+    ),
+    "even levels with a step": Broken(
+        PREFERENCE, PREFERENCE,
+        "[order]", "[factors.voltage_V]\nlevels = { minimum = 8, maximum = 9, step = 1 }\n\n[order]",
+        ("levels.step = 1: unknown key", "known are minimum, maximum, grain", "levels.grain: is missing"), "levels = {",
     ),
     "not TOML": Broken(DIRECTION, DIRECTION, "[breaks]", "[breaks", ("not TOML",), "[breaks"),
     "key twice": Broken(DIRECTION, DIRECTION, "[timing]", "[timing]\nanswer_s = 1.0", ("not TOML", "overwrite")),
@@ -156,7 +177,8 @@ BROKEN = {
         DIRECTION, DIRECTION, "= 20.0", "= " + "9" * 5000, ("not TOML: a whole number has thousands of digits",)
     ),
     "unknown table of a question": Broken(
-        DIRECTION, DIRECTION, "[questions.response]", "[question.response]", ("question: unknown key",), "[question."
+        DIRECTION, DIRECTION, "[questions.response]", "[question.response]",
+        ("question: unknown key; did you mean questions?",), "[question.",
     ),
     "a page break in a title": Broken(
         PREFERENCE, GUN, 'label = "Asymmetric Force I"', 'label = "Force\\fI"', ("U+000C, which is not printed",),

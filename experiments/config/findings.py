@@ -5,18 +5,18 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
 from pydantic.fields import FieldInfo
 
 _LIKE, _MOST_FINDINGS = 5, 2_000
 _LONG_NUMBER = 1e15
 """Findings of a kind that are said, and findings that are looked at."""
 _MISSING = "is missing; it is required"
-_UNKNOWN = "unknown key; remove it or correct its spelling"
 
 CODE = r"[A-Za-z0-9]{1,32}"
 """A participant's code, as a pattern."""
@@ -44,8 +44,10 @@ def validation_text(
     found: dict[tuple[str, ...], list[Any]] = {}
     for finding in error.errors(include_url=False)[:_MOST_FINDINGS]:
         if finding["type"] == "extra_forbidden":
-            known = _known_keys(model, finding["loc"])
-            finding["ctx"] = {"rule": f"{_UNKNOWN}; known are {', '.join(known)}" if known else _UNKNOWN}
+            finding["ctx"] = {"rule": _unknown_key(model, finding["loc"])}
+        if finding["type"] == "dict_type":
+            example = _example(_kind_at(model, finding["loc"]))
+            finding["ctx"] = {"example": example and f", such as {example}"}
         found.setdefault(_place(finding, model, table), []).append(finding)
     inner = {place[:length] for place in found for length in range(len(place))}
     said = [(place, findings) for place, findings in found.items() if not (place in inner and _follows(findings))]
@@ -73,12 +75,37 @@ def _more(like: int, unread: int) -> Iterator[str]:
         yield f"... and {unread} more"
 
 
-def _known_keys(model: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
-    """The keys of the table in which a key is unknown."""
+def _unknown_key(model: type[BaseModel], loc: Sequence[int | str]) -> str:
+    """What is said of a key that is unknown: which one is most like it, and those of its table."""
+    kind, key = _kind_at(model, loc[:-1]), str(loc[-1])
+    if not _is_table(kind):
+        return "unknown key; remove it or correct its spelling"
+    like = get_close_matches(key, kind.model_fields, n=1) if len(key) <= _LINE else []
+    rule = f"did you mean {like[0]}?" if like else "remove it or correct its spelling;"
+    return f"unknown key; {rule} known are {', '.join(kind.model_fields)}"
+
+
+def _kind_at(model: type[BaseModel], loc: Sequence[int | str]) -> Any:
+    """What may stand at a place; `None` where that is not known."""
     kind: Any = model
-    for part in loc[:-1]:
+    for part in loc:
         kind = _kind_inside(kind, part)
-    return list(kind.model_fields) if _is_table(kind) else []
+    return get_args(kind)[0] if get_origin(kind) is Annotated else kind
+
+
+def _example(kind: Any) -> str:
+    """How a table of names of one's own is written, empty where it is not known."""
+    inner = get_args(kind)
+    if get_origin(kind) is Annotated:
+        return _example(inner[0])
+    if get_origin(kind) is dict:
+        value = _example(inner[1])
+        return value and f"{{ NAME = {value} }}"
+    return _WRITTEN.get(kind, "") if isinstance(kind, type) else ""
+
+
+_WRITTEN: Mapping[type, str] = {str: '"..."', int: "2", float: "0.5"}
+"""Values as examples have them."""
 
 
 def _kind_inside(kind: Any, part: int | str) -> Any:
@@ -92,7 +119,7 @@ def _kind_inside(kind: Any, part: int | str) -> Any:
         return inner[1]
     if get_origin(kind) in (tuple, list):
         return inner[0]
-    return next((one for one in inner if _is_table(one) and part in _tags(one)), None)
+    return next((one for one in inner if part in _tags(one)), None)
 
 
 def _kind_of_field(field: FieldInfo) -> Any:
@@ -110,9 +137,15 @@ def _is_table(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
-def _tags(kind: type[BaseModel]) -> list[object]:
-    """The names of a kind among several: what the key that tells them apart may say."""
-    return [name for field in kind.model_fields.values() for name in get_args(field.annotation)]
+def _tags(kind: Any) -> list[object]:
+    """The names of a kind among several: what the key that tells them apart may say, or its own tag."""
+    if get_origin(kind) is Annotated:
+        return [note.tag for note in get_args(kind)[1:] if isinstance(note, Tag)]
+    return (
+        []
+        if not _is_table(kind)
+        else [name for field in kind.model_fields.values() for name in get_args(field.annotation)]
+    )
 
 
 def _all_of_kind(findings: Sequence[Any]) -> bool:
@@ -209,7 +242,7 @@ _RULES_BY_TYPE: Mapping[str, Callable[[Any], str]] = {
     "string_pattern_mismatch": lambda finding: f"must be {PATTERNS.get(finding['ctx']['pattern'], 'spelt otherwise')}",
     "list_type": lambda _: "must be a list",
     "tuple_type": lambda _: "must be a list",
-    "dict_type": lambda _: "must be a table",
+    "dict_type": lambda finding: f"must be a table{finding['ctx']['example']}",
     "model_type": lambda _: "must be a table",
     "model_attributes_type": lambda _: "must be a table",
 }

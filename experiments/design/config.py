@@ -226,10 +226,7 @@ def _name_problems(design: DesignConfig) -> Iterator[str]:
     for name in taken:
         where = "factors" if name in design.factors else "questions"
         yield f"{where}.{name}: {name} is the name of a column that every table has; choose another name"
-    columns = [*_columns_of_factors(design), *_columns_of_questions(design)]
-    both = sorted({name for name in columns if columns.count(name) > 1})
-    if both:
-        yield f"{', '.join(both)} would be two columns of the table, of a factor or question each; rename one"
+    yield from _column_problems(design)
     places = {
         "order.session": design.order.session,
         "order.set": design.order.set,
@@ -243,20 +240,27 @@ def _name_problems(design: DesignConfig) -> Iterator[str]:
                 yield f"{place} names {name!r}, which is no factor; the factors are {', '.join(design.factors)}"
 
 
-def _columns_of_factors(design: DesignConfig) -> Iterator[str]:
+def _column_problems(design: DesignConfig) -> Iterator[str]:
+    columns = [*_columns_of_factors(design), *_columns_of_questions(design)]
+    names = [column for _, column in columns]
+    for place, column in columns[::-1]:  # of two alike the later one is named
+        if names.count(column) > 1:
+            yield f"{place}: {column} would be two columns of the table, of a factor or question each; rename one"
+
+
+def _columns_of_factors(design: DesignConfig) -> Iterator[tuple[str, str]]:
+    """The columns with the table that each is of."""
     for name in design.factors:
-        yield name
-        if name == design.trial.compare:
-            yield from (in_interval(name, place) for place in range(1, design.trial.intervals + 1))
+        compared = range(1, design.trial.intervals + 1) if name == design.trial.compare else ()
+        yield from ((f"factors.{name}", one) for one in (name, *(in_interval(name, place) for place in compared)))
 
 
-def _columns_of_questions(design: DesignConfig) -> Iterator[str]:
+def _columns_of_questions(design: DesignConfig) -> Iterator[tuple[str, str]]:
+    """The columns with the table that each is of."""
     for name, question in design.questions.items():
-        yield name
-        if question.named_answers:
-            yield from (f"{name}_{part}" for part in ("correct", "time_s", "source", "time_valid"))
-        elif question.kind != "text":
-            yield f"{name}_by"
+        parts = ("correct", "time_s", "source", "time_valid") if question.named_answers else ("by",)
+        more = () if question.kind == "text" else parts
+        yield from ((f"questions.{name}", one) for one in (name, *(f"{name}_{part}" for part in more)))
 
 
 def _factor_problems(design: DesignConfig) -> Iterator[str]:
@@ -275,8 +279,9 @@ def _factor_problems(design: DesignConfig) -> Iterator[str]:
 def _level_problems(name: str, factor: FactorConfig) -> Iterator[str]:
     shown, unit = [shown_level(level) for level in factor.all_levels], parted(name).unit
     words = isinstance(factor.all_levels[0], str)
-    if name == DIRECTION_FACTOR and not set(shown) <= set(get_args(Direction)):
-        yield f"levels {', '.join(shown)}: directions are {', '.join(get_args(Direction))}"
+    strangers = [level for level in shown if level not in get_args(Direction)]
+    if name == DIRECTION_FACTOR and strangers:
+        yield f"levels {', '.join(map(repr, strangers))}: directions are {', '.join(get_args(Direction))}"
     if name in {METHOD_FACTOR, INSTRUCTION_FACTOR} and not words:
         yield "levels are numbers; name them in words"
     if unit and words:

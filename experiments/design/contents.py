@@ -74,7 +74,8 @@ def trial_contents(design: DesignConfig, given: Condition, streams: Streams) -> 
     count = len(found) * design.order.repetitions + design.trial.catch
     if count > MAX_TRIALS:
         raise ConfigError(
-            f"a session of {count:,} trials is more than the {MAX_TRIALS:,} that are planned; repeat less"
+            f"order.repetitions = {design.order.repetitions}: a session of {count:,} trials is more than the "
+            f"{MAX_TRIALS:,} that are planned; repeat less"
         )
     if design.trial.intervals > 1:
         contents = [
