@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pingouin
 import pytest
 from scipy import stats
 
@@ -134,3 +136,23 @@ def test_groups_of_people_do_not_hide_the_exponent_of_their_numbers():
     table = pd.DataFrame(rows, columns=["participant_id", "hand", "method", "pulse_s", "q"])
     exponent = summarise(config, table).questions["q"].tests[0]
     assert (exponent.name, exponent.statistic) == ("exponent", pytest.approx(1.0))
+
+
+def test_ranks_have_their_degrees_of_freedom_their_people_and_their_agreement():
+    factors = {"method": {"levels": ["a", "b", "c"]}}
+    question = {"kind": "rating", "text": "?", "minimum": 0, "maximum": 10, "grain": 1}
+    scores = np.array([[1, 2, 3], [2, 3, 5], [1, 3, 2], [4, 6, 7], [5, 5, 9]])
+    rows = [(f"P{i}", method, score) for i, row in enumerate(scores) for method, score in zip("abc", row, strict=True)]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "q"])
+    found = summarise(design(factors=factors, questions={"q": question}), table)
+    test = next(test for test in found.questions["q"].tests if test.name == "friedman")
+    by_pingouin = pingouin.friedman(table, dv="q", within="method", subject="participant_id").iloc[0]
+    assert (test.df, test.n) == ((by_pingouin["ddof1"],), 5)
+    assert (test.statistic, test.p) == pytest.approx((by_pingouin["Q"], by_pingouin["p_unc"]), rel=1e-9)
+    assert test.kendall_w == pytest.approx(by_pingouin["W"], rel=1e-9)
+    statistics = f"χ²(2, N = 5) = {test.statistic:.2f}, p = {test.p:.3f}".replace("0.0", ".0")
+    row = next(row for row in tables_of(found)[1].rows if row[0] == "Friedman, χ²")
+    assert (row[3], row[5]) == ("2", f"Kendall's W = {test.kendall_w:.2f}, N = 5".replace("0.", "."))
+    ranked = replace(found.questions["q"], kind="ranking")  # of which it is the planned test
+    (said,) = result_sentences("test", replace(found, questions={"q": ranked}))
+    assert f"Friedman's test of method: {statistics}, {row[5].removesuffix(', N = 5')}." in said

@@ -117,8 +117,21 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
         )
         yield test if anova.reason else _corrected(test, *factorial_anova(scores, [name]))
     if question.kind in {"rating", "ranking"}:
-        ranks = friedman(scores)
-        yield DesignTest(name="friedman", effect=name, statistic=ranks.chi2, p=ranks.p, reason=ranks.reason)
+        yield _ranks_test(name, scores)
+
+
+def _ranks_test(name: str, scores: FloatArray) -> DesignTest:
+    ranks = friedman(scores)
+    return DesignTest(
+        name="friedman",
+        effect=name,
+        statistic=ranks.chi2,
+        df=None if ranks.df is None else (ranks.df,),
+        p=ranks.p,
+        n=len(scores),
+        kendall_w=ranks.kendall_w,
+        reason=ranks.reason,
+    )
 
 
 def _pairs(scores: FloatArray, labels: Sequence[str], question: QuestionConfig) -> Iterator[DesignTest]:

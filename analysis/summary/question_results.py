@@ -38,7 +38,8 @@ class ConditionSummary:
 class DesignTest:
     """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made.
 
-    `p_gg`: of an ANOVA of more than two levels within people, corrected by `epsilon` (Greenhouse and Geisser).
+    `p_gg`: of an ANOVA of more than two levels within people, corrected by `epsilon` (Greenhouse and Geisser). `n` and
+    `kendall_w`: of Friedman's test, of how many people it is, and how much they agree, 0 to 1.
     """
 
     name: str
@@ -51,6 +52,8 @@ class DesignTest:
     ci_high: float | None = None
     epsilon: float | None = field(default=None, metadata=OPTIONAL)
     p_gg: float | None = field(default=None, metadata=OPTIONAL)
+    n: int | None = field(default=None, metadata=OPTIONAL)
+    kendall_w: float | None = field(default=None, metadata=OPTIONAL)
     reason: str | None = None
 
 

@@ -160,8 +160,13 @@ def _sphericity(test: DesignTest, *, exact: bool = False) -> str:
 
 
 def _ranks_words(test: DesignTest, *, exact: bool) -> str:
-    told = f"χ² = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
+    of = f"{', '.join(map(str, test.df or ()))}, N = {test.n}"
+    told = f"χ²({of}) = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}, {_agreement(test)}"
     return f"Friedman's test of {effect_words(test.effect)}: {told}."
+
+
+def _agreement(test: DesignTest) -> str:
+    return f"Kendall's W = {apa.below_one(test.kendall_w)}"
 
 
 def _exponent_words(test: DesignTest, *, exact: bool) -> str:
@@ -330,6 +335,8 @@ def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:
         more = test.reason
     elif test.ci_low is not None:
         more = apa.interval(test.ci_low, test.ci_high)
+    elif test.kendall_w is not None:
+        more = f"{_agreement(test)}, N = {test.n}"
     else:
         more = apa.NO_NUMBER if test.size is None else f"η²_G = {apa.below_one(test.size)}"
         more += f"; {_sphericity(test)}" if test.p_gg is not None else ""
