@@ -12,8 +12,10 @@ import pingouin
 import pytest
 from scipy import stats
 
+from analysis.report.figures import style
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
+from analysis.summary.figures.designs import figure_design
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
@@ -156,3 +158,17 @@ def test_ranks_have_their_degrees_of_freedom_their_people_and_their_agreement():
     ranked = replace(found.questions["q"], kind="ranking")  # of which it is the planned test
     (said,) = result_sentences("test", replace(found, questions={"q": ranked}))
     assert f"Friedman's test of method: {statistics}, {row[5].removesuffix(', N = 5')}." in said
+
+
+def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(tmp_path, monkeypatch):
+    factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
+    asked = {"kind": "choice", "text": "?", "answers": ["kick", "buzz"]}
+    table = pd.DataFrame({"participant_id": ["P1", "P1", "P2", "P2"], "method": "a", "voltage_V": [6.0, 10.0] * 2})
+    found = summarise(design(factors=factors, questions={"feel": asked}), table.assign(feel=["kick", "buzz"] * 2))
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(found, tmp_path / "figure")
+    assert drawn[0].axes[0].get_ylabel() == "share of kick [%]"
+    (section, *_) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
+    assert "Drawn is the share of kick (feel)." in section.pictures[0].caption
+    assert "Share of kick" in section.tables[0].header

@@ -93,6 +93,13 @@ class QuestionSummary:
         return self.chance is None and any(cell.right is not None for cell in self.cells)
 
     @property
+    def counted(self) -> str | None:
+        """The answer whose share is told of each condition: the first, where none is right."""
+        shares = self.kind in ("choice", "yes-no") and self.preferred is None
+        answers = tuple(self.cells[0].answers or ()) if self.cells and self.cells[0].right is None else ()
+        return answers[0] if shares and answers else None
+
+    @property
     def compared(self) -> bool:
         """Whether any two conditions were tested against each other."""
         return any(test.name == "tukey" for test in self.tests)

@@ -199,13 +199,8 @@ def _numbered(value: float) -> str:
 
 def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
     scored = any(cell.right is not None for cell in question.cells)
-    share = (
-        f"{'hits' if question.detected else 'right'} [%]"
-        if scored
-        else "chosen [%]"
-        if question.preferred
-        else f"{name} [%]"
-    )
+    of = "hits" if question.detected else "right" if scored else "chosen"
+    share = f"share of {drawn_name(question.counted)} [%]" if question.counted else f"{of} [%]"
     axes.set_ylabel(share if question.kind in ("choice", "yes-no") else name)
     axes.set_xlabel(factor_words(factor) if factor else "")
     axes.set_title(name, loc="left", fontweight="bold", parse_math=False)

@@ -18,7 +18,7 @@ from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from device.words import how_many
 from experiments.design.language import Level
-from experiments.design.methods_section import factor_words
+from experiments.design.methods_section import factor_words, joined_by_and
 
 _TESTS = {
     "anova": "ANOVA, F",
@@ -105,10 +105,8 @@ def _mean_word(question: QuestionSummary) -> str:
         return "hits" if question.detected else "right answers"
     if question.preferred:
         return "chosen, in the mean over people"
-    answers = tuple(next(iter(question.cells)).answers or ())
     words = {"number": "geometric means", "ranking": "mean ranks"}
-    share = f"share of {answers[0]}" if answers else "share"
-    return share if question.kind in ("choice", "yes-no") else words.get(question.kind, "means")
+    return f"share of {question.counted}" if question.counted else words.get(question.kind, "means")
 
 
 def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
@@ -242,6 +240,8 @@ def _picture(name: str, found: DesignSummary) -> Picture:
     parts = ["the exact 95 % interval of all trials together"] if scored else []
     parts += ["the SD between participants"] if len(scored) < len(shown) and found.n > 1 else []
     spread = f" Whiskers: {' of right answers, else '.join(parts)}." if parts else ""
+    shares = [f"the share of {one.counted} ({asked})" for asked, one in shown.items() if one.counted]
+    spread = (f" Drawn is {joined_by_and(shares)}." if shares else "") + spread
     means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in shown.items())
     return Picture(
         stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}.{spread}", alt=f"Means by condition. {means}"
@@ -309,7 +309,7 @@ def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> T
         )
         for cell in question.cells
     )
-    first = f"Share of {answers[0]}" if answers else "Chosen"
+    first = f"Share of {question.counted}" if question.counted else "Chosen"
     mean = {"number": "Geometric mean", "choice": first, "yes-no": first}.get(question.kind, "Mean")
     right = "Hits (of catch trials: correct rejections)" if question.detected else "Right"
     kind = ["Trials were"] if caught else []
