@@ -172,3 +172,41 @@ def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(
     (section, *_) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
     assert "Drawn is the share of kick (feel)." in section.pictures[0].caption
     assert "Share of kick" in section.tables[0].header
+
+
+def test_d_prime_is_said_to_be_pooled_and_stands_beside_the_mean_of_the_participants_own():
+    found = summarise(detection(VOLTS), answered(SAID))
+    tests = {(test.name, test.effect): test for test in found.questions["felt"].tests}
+
+    def d_prime(hits, signals, alarms, noises):  # Hautus 1995
+        return float(np.diff(stats.norm.ppf([(alarms + 0.5) / (noises + 1), (hits + 0.5) / (signals + 1)]))[0])
+
+    assert tests["d_prime", "stimulus"].statistic == pytest.approx(d_prime(47, 96, 3, 24), rel=1e-9)
+    assert tests["d_prime", "voltage_V 6"].statistic == pytest.approx(d_prime(5, 48, 3, 24), rel=1e-9)
+    own, mean = np.array([d_prime(21, 48, 1, 12), d_prime(26, 48, 2, 12)]), tests["d_prime_mean", "stimulus"]
+    half = stats.t.ppf(0.975, 1) * own.std(ddof=1) / math.sqrt(2)
+    assert (mean.statistic, mean.df) == (pytest.approx(own.mean(), rel=1e-9), (1,))
+    assert (mean.ci_low, mean.ci_high) == pytest.approx((own.mean() - half, own.mean() + half), rel=1e-9)
+    assert "d_prime_mean" in names_of_tests(detection(VOLTS), detection(VOLTS).questions["felt"])
+    (sentence,) = result_sentences("test", found)
+    pooled = f"{tests['d_prime', 'stimulus'].statistic:.2f}"
+    assert f"participants' answers together gave d′ = {pooled} with the log-linear correction; the part" in sentence
+    assert f"participants' own: M = {own.mean():.2f}, 95 % CI [" in sentence
+    by_test = tables_of(found)[1]
+    assert by_test.caption.endswith(
+        "pooled is what is of all participants' answers together, with the log-linear correction"
+    )
+    assert [row[:2] for row in by_test.rows if row[0].startswith("d′")] == [
+        ("d′, pooled", "all conditions"),
+        ("d′, pooled", "6 V"),
+        ("d′, pooled", "10 V"),
+        ("d′, mean of participants", "all conditions"),
+    ]
+
+
+def test_a_condition_of_several_factors_is_called_by_its_levels_beside_its_d_prime():
+    ways = VOLTS | {"direction": {"levels": ["forward", "backward"]}}
+    table = answered(SAID)
+    way = pd.Series(["forward", "backward"] * (len(table) // 2)).where(table["stimulus"] == 1)
+    (_, by_test) = tables_of(summarise(detection(ways), table.assign(direction=way)))
+    assert "6 V, backward" in [row[1] for row in by_test.rows]

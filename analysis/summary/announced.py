@@ -17,7 +17,7 @@ from experiments.design.language import QuestionConfig
 from experiments.design.procedure_problems import has_success
 from experiments.tasks.questions import chance
 
-TestName = Literal["anova", "friedman", "tukey", "exponent", "d_prime", "criterion"]
+TestName = Literal["anova", "friedman", "tukey", "exponent", "d_prime", "criterion", "d_prime_mean"]
 
 
 def names_of_tests(design: DesignConfig, question: QuestionConfig) -> tuple[TestName, ...]:
@@ -73,6 +73,7 @@ def _sensitivity(question: QuestionConfig) -> Iterator[TestName]:
         yield "d_prime"
     if question.correct == "stimulus":
         yield "criterion"
+        yield "d_prime_mean"
 
 
 def sentences_of_tests(design: DesignConfig) -> Iterator[str]:
@@ -107,6 +108,7 @@ def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
         "exponent": f"the exponent of the power law over {powers}, tested against 0",
         "d_prime": "d′ of all answers together and of each condition",
         "criterion": "and the criterion",
+        "d_prime_mean": "the mean of the participants' own d′ with its 95 % interval",
     }
     names = names_of_tests(design, question)
     held = bool(design.adapted) and has_success(question)

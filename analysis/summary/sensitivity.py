@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
 import pandas as pd
+import scipy
 
 from analysis.stats.binomial import yes_no
 from analysis.stats.discrimination import Task, discrimination
@@ -19,6 +21,8 @@ def sensitivity(
 ) -> Iterator[DesignTest]:
     """d′ of all people's answers together, by the formula of the task: of all conditions, and of each.
 
+    Of detection the mean of people's own d′ comes last: where people differ, that of their answers together is another.
+
     `kind`: of the design's trials. `conditions`: the rows of each condition, without catch trials, by its name.
     """
     if question.correct == "stimulus":
@@ -26,6 +30,7 @@ def sensitivity(
         noise = scored[~stimulus]
         for name, some in {"stimulus": scored[stimulus], **conditions}.items():
             yield from _detection(name, some, noise)
+        yield from _mean_of_people(scored)
     elif question.correct in {"interval", "larger"} and len(scored):
         for name, some in {kind: scored, **conditions}.items():
             found = discrimination(int(some["score"].sum()), len(some), _TASKS[kind])
@@ -38,3 +43,22 @@ def _detection(name: str, signal: pd.DataFrame, noise: pd.DataFrame) -> Iterator
         found = yes_no(hits, len(signal), len(noise) - rejected, len(noise))
         yield DesignTest(name="d_prime", effect=name, statistic=float(found.d_prime))
         yield DesignTest(name="criterion", effect=name, statistic=float(found.criterion))
+
+
+def _mean_of_people(scored: pd.DataFrame) -> Iterator[DesignTest]:
+    """The mean of the d′ of each person who had stimuli and catch trials, with its interval by Student's t."""
+    right = scored.groupby(["participant_id", scored["stimulus"].astype(int)])["score"].agg(["sum", "size"])
+    people = right.unstack("stimulus").dropna()
+    if len(people) < 2:
+        return
+    (hits, signals), (rejected, noises) = ((people["sum", kind], people["size", kind]) for kind in (1, 0))
+    own = np.asarray(yes_no(hits, signals, noises - rejected, noises).d_prime)
+    low, high = scipy.stats.ttest_1samp(own, 0.0).confidence_interval()
+    yield DesignTest(
+        name="d_prime_mean",
+        effect="stimulus",
+        statistic=float(own.mean()),
+        df=(len(own) - 1,),
+        ci_low=float(low),
+        ci_high=float(high),
+    )

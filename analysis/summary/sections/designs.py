@@ -17,7 +17,7 @@ from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from device.words import how_many
-from experiments.design.language import Level
+from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words, joined_by_and
 
 _TESTS = {
@@ -25,12 +25,14 @@ _TESTS = {
     "tukey": "Tukey, q",
     "friedman": "Friedman, χ²",
     "exponent": "exponent",
-    "d_prime": "d′",
-    "criterion": "criterion c",
+    "d_prime": "d′, pooled",
+    "criterion": "criterion c, pooled",
+    "d_prime_mean": "d′, mean of participants",
     "preferred": "preferred",
 }
 """What a test is called, with the letter of its statistic."""
-_ESTIMATES = frozenset(["d_prime", "criterion", "preferred"])
+_SENSITIVITY = frozenset(["d_prime", "criterion", "d_prime_mean"])
+_ESTIMATES = _SENSITIVITY | {"preferred"}
 _TOLD = 6
 """So many conditions or pairs are told in a sentence; more are in the table."""
 
@@ -56,6 +58,9 @@ _PLANNED = (
     "planned are those that the analysis fixes for a design before it sees any data; whoever registered another test "
     "reports that"
 )
+
+
+_POOLED = "pooled is what is of all participants' answers together"
 
 
 def _standing(question: QuestionSummary, test: DesignTest) -> str:
@@ -135,9 +140,7 @@ def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
         )
         yield f"Planned comparisons (Tukey's HSD): {told}."
     yield from (_exponent_words(test, exact=exact) for test in question.tests if test.name == "exponent")
-    d_prime = next((test for test in question.tests if test.name == "d_prime"), None)
-    if d_prime is not None:
-        yield f"All answers together gave d′ = {apa.number(d_prime.statistic)}."
+    yield from _sensitivity_words(question)
 
 
 def _is_none(test: DesignTest) -> bool:
@@ -167,9 +170,23 @@ def _agreement(test: DesignTest) -> str:
     return f"Kendall's W = {apa.below_one(test.kendall_w)}"
 
 
+def _sensitivity_words(question: QuestionSummary) -> Iterator[str]:
+    """d′ of all answers, and that of people in the mean; conditions follow, and are in the table."""
+    of_all = {test.name: test for test in reversed(question.tests) if test.name in _SENSITIVITY}
+    if "d_prime" in of_all:
+        corrected = " with the log-linear correction" if question.detected else ""
+        told = f"All participants' answers together gave d′ = {apa.number(of_all['d_prime'].statistic)}{corrected}"
+        own = of_all.get("d_prime_mean")
+        yield f"{told}; the participants' own: {_mean_and_interval(own)}." if own else f"{told}."
+
+
 def _exponent_words(test: DesignTest, *, exact: bool) -> str:
-    told = f"M = {apa.number(test.statistic)}, 95 % CI {apa.interval(test.ci_low, test.ci_high)}"
-    return f"Power-law exponent over {effect_words(test.effect)}: {told}; against 0 {apa.p_value(test.p, exact=exact)}."
+    told = f"{_mean_and_interval(test)}; against 0 {apa.p_value(test.p, exact=exact)}"
+    return f"Power-law exponent over {effect_words(test.effect)}: {told}."
+
+
+def _mean_and_interval(test: DesignTest) -> str:
+    return f"M = {apa.number(test.statistic)}, 95 % CI {apa.interval(test.ci_low, test.ci_high)}"
 
 
 _WITH_UNIT = re.compile(r"[A-Za-z]\w*_(?:V|s|N|A|ohm|m|kg|Hz)\b")
@@ -284,6 +301,8 @@ def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Itera
         header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval", "Standing")
         rows = tuple((*_test(found, test), _standing(question, test)) for test in question.tests)
         note = f"; {_PLANNED}" if any(row[-1] == "planned" for row in rows) else ""
+        note += f"; {_POOLED}" if any(test.name == "d_prime" for test in question.tests) else ""
+        note += ", with the log-linear correction" if question.detected and _POOLED in note else ""
         yield Table(caption=f"{name}: tests{note}", header=header, rows=rows)
 
 
@@ -345,14 +364,17 @@ def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:
 
 
 def _condition_part(found: DesignSummary, part: str) -> str:
-    """A factor and its level by what that is called; else an effect in words."""
-    name, _, level = part.partition(" ")
-    label = found.labels.get(name, {}).get(level)
-    return effect_words(part) if label is None else f"{factor_words(name)} {display_name(label)}"
+    """A factor's level by what that is called; else an effect in words."""
+    name, _, shown = part.partition(" ")
+    factor = name if name in found.factors else name.removesuffix("_1").removesuffix("_2")
+    levels = {shown_level(level): level for level in found.factors.get(factor, ())}
+    return display_name(found.label(name, levels[shown])) if shown in levels else effect_words(part)
 
 
 def _effect(found: DesignSummary, test: DesignTest) -> str:
     """What was tested; of a pair both levels by what they are called."""
+    if test.name in _SENSITIVITY and " " not in test.effect:
+        return "all conditions"
     if test.name != "tukey":
         return ", ".join(_condition_part(found, part) for part in test.effect.split(", "))
     labels = {level: label for of in found.labels.values() for level, label in of.items()}
