@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.screens.participant.standstill import LONGEST_S, Standstills
+from experiments.screens.participant.standstill import LONGEST_STANDSTILL_S, Standstills
 
 
 class Clock:
@@ -26,7 +26,7 @@ def looked_at(*moments_s: float) -> tuple[Standstills, Clock]:
     return found, clock
 
 
-@pytest.mark.parametrize("stamped_s", [0.02, 0.5, 1.02, 1.02 + LONGEST_S])
+@pytest.mark.parametrize("stamped_s", [0.02, 0.5, 1.02, 1.02 + LONGEST_STANDSTILL_S])
 def test_a_key_in_a_standstill_or_right_after_it_tells_how_long_it_was(stamped_s: float) -> None:
     found, clock = looked_at(0.01, 1.02, 1.03, 1.1)
     clock.now_s = 1.15

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-LONGEST_S = 0.1
+LONGEST_STANDSTILL_S = 0.1
 """How long the program may stand still: less is little beside how people differ from trial to trial."""
 
 _LOOK_S = 0.01
@@ -27,9 +27,9 @@ class Standstills:
         threading.Thread(target=self._watch, name="standstills", daemon=True).start()
 
     def look(self) -> None:
-        """Look once: more than `LONGEST_S` since the last time is a standstill."""
+        """Look once: more than `LONGEST_STANDSTILL_S` since the last time is a standstill."""
         now_s = self._now()
-        if now_s - self._seen_s > LONGEST_S:
+        if now_s - self._seen_s > LONGEST_STANDSTILL_S:
             self._missed.append((self._seen_s, now_s))
         self._seen_s = now_s
 
@@ -39,8 +39,8 @@ class Standstills:
         A key may be stamped before the thread has looked again: what is missing until now counts too.
         """
         missed = [*self._missed, (self._seen_s, self._now())]
-        near = (end - start for start, end in missed if start <= stamped_s <= end + LONGEST_S)
-        return max((stood_s for stood_s in near if stood_s > LONGEST_S), default=0.0)
+        near = (end - start for start, end in missed if start <= stamped_s <= end + LONGEST_STANDSTILL_S)
+        return max((stood_s for stood_s in near if stood_s > LONGEST_STANDSTILL_S), default=0.0)
 
     def _watch(self) -> None:
         while True:
