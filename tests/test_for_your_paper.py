@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
 import pytest
 
 import analysis.summary.analyze as feature
+import recoil
 from analysis.logs.reading import read_logs
 from analysis.summary.participation import participation
 from analysis.summary.sections import sections
@@ -20,6 +22,7 @@ from analysis.summary.sections.manuscript import manuscript_section
 from analysis.summary.sections.pictures import directions_picture
 from analysis.summary.sections.quality import quality_section
 from analysis.summary.sections.supplement import supplement_sections
+from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
 from experiments.rebuild import rebuild
@@ -298,6 +301,15 @@ def test_a_time_of_exactly_0_is_told_as_a_reason_for_having_none(tmp_path: Path,
     assert report.statistics.direction.response_times.left_out == 2
     (section,) = quality_section(report)
     assert "None in 2 answered trials: there is no time in the log, or it is 0, or the" in section.paragraphs[0]
+
+
+def test_beside_designs_it_is_said_of_what_the_response_times_are(careless: ReportData, tmp_path: Path) -> None:
+    (alone,) = quality_section(careless)
+    assert "valid response times. None in" in alone.paragraphs[0]
+    recoil.run_synthetic(recoil.load_config("stronger"), ["P01", "P02"], tmp_path / "beside", seed=1)
+    designs = summarize(read_logs([tmp_path / "beside"])).designs
+    (beside,) = quality_section(replace(careless, statistics=replace(careless.statistics, designs=designs)))
+    assert "valid response times of direction recognition. None in" in beside.paragraphs[0]
 
 
 def test_times_that_are_not_there_are_not_laid_on_the_experimenter(careless: ReportData) -> None:

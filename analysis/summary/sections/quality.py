@@ -19,7 +19,8 @@ from device.words import how_many
 def quality_section(report: ReportData) -> Iterator[Section]:
     """What a reader has to know of the data before believing the tests."""
     statistics = report.statistics
-    times = () if statistics.direction is None else (_times_sentence(statistics.direction.response_times),)
+    of = f" of {EXPERIMENTS['direction']}" if statistics.designs else ""  # which may have times as well
+    times = () if statistics.direction is None else (_times_sentence(statistics.direction.response_times, of),)
     tables = tuple(table for table in (_ends(report),) if table.rows)
     told = (*_warnings(report), *_of_answers(statistics.direction), *report.dropped, *_of_designs(report))
     items = shortened([*told], "warnings")
@@ -83,15 +84,15 @@ def undefined_numbers(report: ReportData) -> Iterator[Section]:
         yield Section(title="Numbers that are undefined here", items=listed, appendix=True, folded=True)
 
 
-def _times_sentence(times: ResponseTimes) -> str:
-    """How many response times there are, and which are none."""
+def _times_sentence(times: ResponseTimes, of: str) -> str:
+    """How many response times there are, `of` what, and which are none."""
     left_out = (
         f"None in {how_many(times.left_out, 'answered trial')}: there is no time in the log, or it is 0, or the answer "
         "was entered or corrected by the experimenter, whose hand tells nothing of the participant's time."
     )
     if not times.n:
-        return f"There is no valid response time, and so no figure of them. {left_out}"
-    return f"There are {times.n:,} valid response times.{' ' + left_out if times.left_out else ''}"
+        return f"There is no valid response time{of}, and so no figure of them. {left_out}"
+    return f"There are {times.n:,} valid response times{of}.{' ' + left_out if times.left_out else ''}"
 
 
 def _ends(report: ReportData) -> Table:
