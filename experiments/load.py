@@ -21,6 +21,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
 from experiments.design.planned import planned_run, plans_of_groups
 from experiments.design.stimuli import limits, shown_cell, unchanged_methods
+from experiments.record import storage
 from experiments.record.design_columns import columns
 from experiments.record.tables import MAY_LACK, TABLES, unguard
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw, check_laws
@@ -38,7 +39,7 @@ def find(name: str | Path) -> Path:
     if isinstance(name, Path):
         if name.is_file():
             return name
-        raise ConfigError(f"{name}: {'a folder, not a config' if name.is_dir() else 'no such file'}")
+        raise ConfigError(f"{name}: {_why_none(name, 'config')}")
     shipped = shipped_folder() / (name if name.endswith(".toml") else f"{name}.toml")
     for path in (Path(name), shipped if shipped.parent == shipped_folder() else Path(name)):
         if path.is_file():
@@ -46,7 +47,16 @@ def find(name: str | Path) -> Path:
     known = ", ".join(sorted(path.stem for path in shipped_folder().glob("*.toml")))
     if name and Path(name).is_dir():
         raise ConfigError(f"{name}: a folder, not a config; name a file in it, or a shipped config: {known}")
+    if name and Path(name).exists():
+        raise ConfigError(f"{escaped(name)}: {_why_none(Path(name))}; a shipped config is one of {known}")
     raise ConfigError(f"{escaped(name)}: no such file and no shipped config; shipped are {known}")
+
+
+def _why_none(path: Path, what: str = "file") -> str:
+    """Why a path that is no file is none."""
+    if path.is_dir():
+        return f"a folder, not a {what}"
+    return storage.NO_FILE if path.exists() else "no such file"
 
 
 def load_setup(name: str | Path) -> Setup[DesignConfig]:
@@ -72,8 +82,7 @@ def load_setup(name: str | Path) -> Setup[DesignConfig]:
         return setup
     people = path.parent / design.synthetic
     if not people.is_file():
-        what = "a folder, not a file" if people.is_dir() else "no such file"
-        raise ConfigError(f"{people}: {what}; the config's key `synthetic` names it")
+        raise ConfigError(f"{people}: {_why_none(people)}; the config's key `synthetic` names it")
     laws = load(SyntheticAnswers, path.parent / design.synthetic)
     with _named(path.parent / design.synthetic):
         check_laws(design, laws, plans)
@@ -129,8 +138,7 @@ def _named(path: Path) -> Iterator[None]:
 def load_gun(path: Path) -> GunConfig:
     """A gun's config."""
     if not path.is_file():
-        what = "a folder, not a file" if path.is_dir() else "no such file"
-        raise ConfigError(f"{path}: {what}; the config's key `gun` names it")
+        raise ConfigError(f"{path}: {_why_none(path)}; the config's key `gun` names it")
     return load(GunConfig, path)
 
 

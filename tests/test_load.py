@@ -1,5 +1,6 @@
 """Broken configs: the shipped ones, each with one edit. Every refusal names file, line, key, value and rule."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -73,6 +74,16 @@ def test_a_path_goes_before_a_shipped_name(folder: Path, monkeypatch: pytest.Mon
 def test_a_name_that_means_no_file_is_refused_with_what_is_shipped(name: str) -> None:
     with pytest.raises(ConfigError, match=r"(no such file|a folder).*direction.*gun.*paper, preference.*study"):
         load_setup(name)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_is_refused_as_what_it_is_wherever_a_config_belongs(folder: Path) -> None:
+    os.mkfifo(pipe := folder / "pipe.toml")
+    for place in (pipe, str(pipe)):
+        with pytest.raises(ConfigError, match=r"pipe\.toml: it is a pipe or a device, not a file"):
+            load_setup(place)
+    edit(folder / DIRECTION, 'gun = "gun.toml"', 'gun = "pipe.toml"')
+    assert "pipe.toml: it is a pipe or a device, not a file; the config's key `gun`" in refusal(folder / DIRECTION)
 
 
 # one edit each
