@@ -483,12 +483,18 @@ def test_a_font_without_a_letter_is_refused_with_the_letter():
 
 def test_english_looks_for_no_font_and_arabic_is_looked_for_in_the_forms_that_are_drawn(folder):
     assert font_for(ENGLISH, "abc").path is None
-    with pytest.raises(ConfigError, match=r"Noto Sans lacks U\+67AA .* say in the design in which language"):
-        font_for(ENGLISH, "枪")
     turned = language(RIGHT_TO_LEFT, folder)
     found = font_for(turned, letters_of(turned, load_setup("preference")))
     assert found.family == "DejaVu Sans"
     assert found.path is not None
+
+
+def test_what_counts_as_english_is_shown_in_any_font_that_has_its_letters():
+    assert font_for(ENGLISH, "Wie fühlte es sich an?").family == "Noto Sans"
+    found = font_for(ENGLISH, "ʘ ⅓ ☺ ⠿")  # of which Noto Sans has not all
+    assert (found.family[:6], found.path is None) == ("DejaVu", False)
+    with pytest.raises(ConfigError, match=r"Noto Sans lacks U\+67AA .*: fonts-noto-cjk has .* needs a catalogue"):
+        font_for(ENGLISH, "枪 😀 𒀀")  # which no font has together
 
 
 # runs

@@ -34,7 +34,10 @@ class Font:
 
 
 def font_for(language: Language, letters: str) -> Font:
-    """The first of the language's fonts that is installed and has all letters. `ConfigError` says what each lacks."""
+    """The first of the language's fonts that is installed and has all letters. `ConfigError` says what each lacks.
+
+    What counts as English may be written in any language: there any other font that has all letters will do.
+    """
     if language is ENGLISH and letters.isascii():
         return Font(family=ENGLISH.fonts[0])
     needed = {letter for letter in shaped(letters) + _PLAIN if letter.isprintable()}
@@ -44,12 +47,25 @@ def font_for(language: Language, letters: str) -> Font:
         if not missing:
             return Font(family=family, path=path)
         lacking[family] = f"lacks {_named(missing)}"
-    other = "name another in the head of the catalogue"
-    other = "say in the design in which language it is written" if language is ENGLISH else other
+    if language is ENGLISH:
+        for path in _font_files():
+            family, has = _letters_of(path)
+            if needed <= has:
+                return Font(family=family, path=path)
     raise ConfigError(
         f"language {language.code} ({language.name}): no font has all its letters, so participants would see empty "
-        f"boxes: {'; '.join(f'{family} {why}' for family, why in lacking.items())}. Install one of them (as a file in "
-        f"{_own_folder()}, or by your system's packages), or {other}"
+        f"boxes: {'; '.join(f'{family} {why}' for family, why in lacking.items())}. {_remedy(language)}"
+    )
+
+
+def _remedy(language: Language) -> str:
+    where = f"(as a file in {_own_folder()}, or by your system's packages)"
+    if language is not ENGLISH:
+        return f"Install one of them {where}, or name another in the head of the catalogue"
+    return (
+        f"Install a font that has all of them {where}: fonts-noto-cjk has Chinese, Japanese and Korean; few have "
+        "emoji beside other letters, so leave those out. Or say in the design in which language it is written, which "
+        "needs a catalogue (docs/howto/languages.md)"
     )
 
 
@@ -81,13 +97,13 @@ def _installed(families: tuple[str, ...]) -> Iterator[tuple[str, Path, frozenset
     files = list(_font_files())
     for family in families:
         for path in files:
-            if has := _letters_of(path, family):
+            if has := _letters_of(path, family)[1]:
                 yield family, path, has
                 break
 
 
-def _letters_of(path: Path, family: str) -> frozenset[str]:
-    """The letters of a font file's regular face; none if it is of another family, or cannot be read."""
+def _letters_of(path: Path, family: str | None = None) -> tuple[str, frozenset[str]]:
+    """The family and letters of a font file's regular face; none if it is not of the family, or cannot be read."""
     # imported when used: whoever runs in English needs none of it
     from fontTools.ttLib import TTCollection, TTFont, TTLibError  # noqa: PLC0415
 
@@ -95,11 +111,12 @@ def _letters_of(path: Path, family: str) -> frozenset[str]:
         with TTCollection(path, lazy=True) if path.suffix.lower() in _SEVERAL else TTFont(path, lazy=True) as file:
             for face in file.fonts if isinstance(file, TTCollection) else (file,):
                 name = face["name"]
-                if name.getBestFamilyName() == family and name.getBestSubFamilyName() in _UPRIGHT:
-                    return frozenset(map(chr, face.getBestCmap() or ()))
+                own = str(name.getBestFamilyName())
+                if family in (None, own) and name.getBestSubFamilyName() in _UPRIGHT:
+                    return own, frozenset(map(chr, face.getBestCmap() or ()))
     except (OSError, TTLibError, KeyError, AttributeError, AssertionError):
-        return frozenset()
-    return frozenset()
+        pass
+    return "", frozenset()
 
 
 def _font_files() -> Iterator[Path]:
