@@ -48,6 +48,13 @@ def test_analyze_without_a_folder_for_its_results_says_what_to_give(recoil: Reco
     refused(recoil("analyze", "results"), "give --out DIR", "recoil analyze results --out analysis")
 
 
+def test_the_module_is_the_command_line() -> None:
+    command = [sys.executable, "-m", "recoil", "check", "direction"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "60 trials" in done.stdout
+
+
 def test_wrong_usage_is_2(recoil: Recoil) -> None:
     refused(recoil("run", "direction"), "--participant")
     refused(recoil("unknown"), "unknown")
