@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+from analysis.predict.check_design import check_design
+from analysis.summary.designs import summarise
 from experiments.config.door import load
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section
-from experiments.design.planned import planned_run
+from experiments.design.planned import planned_run, runs_of_groups
 from experiments.design.planning import plan_of, square_size
-from tests.designs import design, path_of
+from experiments.load import load_gun, load_setup
+from tests.designs import changed, design, path_of
+from tests.tables_of_designs import loaded, simulated
 
 
 def said(name):
@@ -45,6 +49,40 @@ def test_what_nesting_makes_differ_is_told_of_every_group_and_session():
     assert "There were 2 or 3 sessions, each of one voltage in V" in text
     assert "In each session every condition came once, in random order: 2 trials." in text
     assert "The 4 or 6 trials were planned to take 4 or 6 s." in text
+
+
+def test_methods_are_called_as_the_gun_does_unless_the_design_has_a_label_of_its_own():
+    own = design(
+        factors={"method": {"levels": ["asymmetric-1", "vibration"], "labels": {"vibration": "Buzz"}}},
+        trial={"kind": "oddity", "compare": "method", "standard": "asymmetric-2"},
+        questions={"odd": {"kind": "choice", "text": "?", "answers": ["first", "second", "third"]}},
+    )
+    labels = load_gun(path_of("gun")).labels
+    text = "\n".join(methods_section(own, [planned_run(own, plan_of(own, "P01", 1))], labels))
+    assert "Method (Asymmetric Force I, Buzz) varied within participants." in text
+    assert "two at the standard (method: Asymmetric Force II)" in text
+    assert "Method (Asymmetric Force I) was the same" in "\n".join(check_design(load_setup("voltages"), 1, ["P1"]).text)
+
+
+def test_the_words_for_a_paper_call_methods_as_their_gun_does():
+    config, laws = loaded("voltages")
+    found = summarise(config, simulated(config, laws, 2), {"asymmetric-1": "Asymmetric Force I"})
+    assert "Method (Asymmetric Force I) was the same in all trials." in found.protocol[0]
+
+
+def test_a_ranking_says_what_rank_1_means():
+    ranked = design(
+        factors={"method": {"levels": ["a", "b"]}},
+        questions={"best": {"kind": "ranking", "text": "Which?", "when": "block", "minimum_text": "most comfortable"}},
+    )
+    text = "\n".join(methods_section(ranked, [planned_run(ranked, plan_of(ranked, "P01", 1))]))
+    assert "“Which?” (an order of the set's trials, 1 = most comfortable)" in text
+
+
+def test_the_trials_of_one_track_are_told_once():
+    one = changed("staircase", order={"sets": 1}, procedure={"starts": (0.008,), "trials": 30, "reversals": 8}).config
+    (_, order, *_) = methods_section(one, runs_of_groups(one))
+    assert order == "In the session there was one track of at most 30 trials, which ended with reversal 8."
 
 
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ def _method(one: ArchivedDesign) -> Iterator[str]:
         yield f"{which} end; the archive has what was answered up to there.\n"
     if one.differs:
         yield f"What differs from the first setup of this experiment: {one.differs}.\n"
-    for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun)):
+    for paragraph in methods_section(one.design, runs_of_groups(one.design, one.gun), one.gun.labels):
         yield f"{paragraph}\n"
     yield from _translations(one)
 

@@ -91,7 +91,7 @@ def _eligible(rules: EligibilityConfig) -> str:
 
 def _design(setup: Setup[DesignConfig]) -> Iterator[str]:
     yield f"## Design: {setup.config.title} ({setup.config.experiment})"
-    yield from methods_section(setup.config, runs_of_groups(setup.config, setup.gun))
+    yield from methods_section(setup.config, runs_of_groups(setup.config, setup.gun), setup.gun.labels)
     labels = (f"{setup.gun.methods[name].label} ({name})" for name in setup.config.methods)
     yield f"The gun: {setup.gun.title}. Its methods: {', '.join(labels)}."
 

@@ -103,7 +103,7 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
     return DesignCheck(
         experiment=design.design,
         title=design.title,
-        text=methods_section(design, runs_of_groups(design, setup.gun)),
+        text=methods_section(design, runs_of_groups(design, setup.gun), setup.gun.labels),
         trials=planned.trials,
         duration_s=planned.duration_s,
         least_trials=planned.least_trials,

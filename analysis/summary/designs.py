@@ -59,7 +59,7 @@ def summarise(
         origin=_hands(design, table),
         words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
         assumed=design.assumed,
-        protocol=methods_section(design, runs_of_groups(design)),
+        protocol=methods_section(design, runs_of_groups(design), gun_labels),
         labels=_labels(design, gun_labels),
     )
 

@@ -86,6 +86,11 @@ class GunConfig(Model):
         """The voice coil by itself, without what methods change of it."""
         return _build(GunParameters, self.voice_coil, {}, "", "voice_coil")
 
+    @property
+    def labels(self) -> dict[str, str]:
+        """What the gun calls its methods."""
+        return {name: method.label for name, method in self.methods.items()}
+
     def rendering(self, method: str) -> Method:
         """The device's parameters of one method."""
         return self._rendered[method]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from experiments.design.config import DesignConfig
 from experiments.design.language import (
     EMPTY,
     INSTRUCTION_FACTOR,
+    METHOD_FACTOR,
     BlockOrder,
     FactorConfig,
     Level,
@@ -21,11 +23,15 @@ from experiments.design.stimuli import by_hand
 from experiments.design.units import parted, written_unit
 
 
-def methods_section(design: DesignConfig, runs: Sequence[PlannedRun]) -> tuple[str, ...]:
+def methods_section(
+    design: DesignConfig, runs: Sequence[PlannedRun], gun_labels: Mapping[str, str] = MappingProxyType({})
+) -> tuple[str, ...]:
     """The paragraphs: what varied, in which order, what a trial was, what was asked, practice, how long it took.
 
-    `runs`: what is planned for a participant of each group, which nested factors make differ.
+    `runs`: what is planned for a participant of each group, which nested factors make differ. `gun_labels`: what the
+    gun calls its methods, which are called so unless the design has labels of its own.
     """
+    design = _labelled(design, gun_labels)
     return (
         " ".join(_factors(design)),
         " ".join(_order(design, runs)),
@@ -33,6 +39,13 @@ def methods_section(design: DesignConfig, runs: Sequence[PlannedRun]) -> tuple[s
         " ".join(_questions(design)),
         " ".join(_rests(design, runs)),
     )
+
+
+def _labelled(design: DesignConfig, gun_labels: Mapping[str, str]) -> DesignConfig:
+    """The design with what the gun calls its methods beside its own labels."""
+    method = design.factors[METHOD_FACTOR]
+    labelled = method.model_copy(update={"labels": {**gun_labels, **method.labels}})
+    return design.model_copy(update={"factors": {**design.factors, METHOD_FACTOR: labelled}})
 
 
 def _factors(design: DesignConfig) -> Iterator[str]:
@@ -162,6 +175,8 @@ def _tracks(design: DesignConfig, table: AdaptiveConfig, where: str, each: Seque
     tracks = sum(trials - design.trial.catch for trials in each) // len(each) // table.trials
     how = "one after another in random order" if not table.interleave else "interleaved in random order"
     some = f"was one track {end_words(table)}" if tracks == 1 else f"were {tracks} tracks {end_words(table)}, {how}"
+    if tracks == 1 and not design.trial.catch:
+        return f"{where} there {some}{_sets(design, each)}."  # its trials are those of the session
     most = "" if least_of_track(table) == table.trials else "at most "
     return f"{where} there {some}: {most}{_counts(each)} trials{_sets(design, each)}."
 
@@ -215,7 +230,7 @@ def _several_intervals(design: DesignConfig, planned: PlannedRun) -> str:
             pairs = "each pair first in an order drawn at random, and turned round whenever it came again"
         return f"two shots {gap} that differed in {compared}: {pairs}"
     standard = shown_level(trial.standard) if trial.standard is not None else ""
-    named = f"the standard ({compared}: {standard})"
+    named = f"the standard ({compared}: {design.factors[trial.compare or ''].labels.get(standard, standard)})"
     if trial.kind == "abx":
         return f"three shots {gap}: A, B and one of them again; one was {named}"
     if trial.kind == "oddity":
@@ -243,7 +258,8 @@ def _question(question: QuestionConfig) -> str:
         case "number":
             how = "a number of their own"
         case "ranking":
-            how = "an order of the set's trials"
+            first = f", 1 = {question.minimum_text}" if question.minimum_text else ""
+            how = f"an order of the set's trials{first}"
         case "text":
             how = "in their own words"
     return f"“{question.text}” ({how})"

@@ -88,7 +88,7 @@ def read_request(request: PerceptRequest) -> PerceptTask:
         methods=_methods(find(request.gun), gun, rates),
         people=scaled_spread(ASSUMED_SPREAD, request.spread),
         published=published,
-        labels={name: method.label for name, method in gun.methods.items()},
+        labels=gun.labels,
     )
 
 

@@ -237,7 +237,7 @@ def make_grid(request: PowerRequest) -> Grid:
         published=published,
         request=request,
         percepts=_percepts(setup, config),
-        labels={name: method.label for name, method in setup.gun.methods.items()},
+        labels=setup.gun.labels,
     )
 
 
