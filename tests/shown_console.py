@@ -14,15 +14,18 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from device import LinkError
 from experiments import run as runs
 from experiments.clock import RealClock
+from experiments.design.language import QuestionConfig
 from experiments.live_run import RunStopped
 from experiments.run_request import RunRequest
 from experiments.screens.console import app
+from experiments.screens.console.keys import ANSWERS
 from experiments.screens.console.view import Ended, ParticipantSeen
 from experiments.session import events
 from experiments.session.states import State
@@ -44,7 +47,10 @@ LOST = "the participant's screen ended with exit code 1; its last words: pyglet.
 
 
 def cut(window: Any) -> list[str]:
-    """The labels, buttons, fields and bars that are to be seen but not as a whole, by their texts."""
+    """The labels, buttons, fields and bars that are to be seen but not as a whole, by their texts.
+
+    An answer's button is whole if all of the answer stands on it.
+    """
     from PyQt6.QtWidgets import QLabel, QLineEdit, QProgressBar, QPushButton
 
     kinds = (QLabel, QPushButton, QLineEdit, QProgressBar)
@@ -70,7 +76,7 @@ def _is_whole(widget: Any) -> bool:
         needed = widget.fontMetrics().boundingRect(widget.contentsRect(), _flags(widget), widget.text())
         return needed.height() <= widget.contentsRect().height() and needed.width() <= widget.contentsRect().width()
     if isinstance(widget, QPushButton):
-        return _button_holds(widget)
+        return _button_holds(widget) and _says_its_answer(widget)
     return bool(widget.height() >= widget.fontMetrics().height())
 
 
@@ -90,6 +96,11 @@ def _button_holds(button: Any) -> bool:
     room = button.style().subElementRect(QStyle.SubElement.SE_PushButtonContents, option, button)
     needed = button.fontMetrics().size(Qt.TextFlag.TextShowMnemonic.value, button.text())
     return bool(needed.width() <= room.width() and needed.height() <= room.height())
+
+
+def _says_its_answer(button: Any) -> bool:
+    words = " ".join(button.text().split()).casefold()
+    return getattr(button, "name", None) not in ANSWERS or words.startswith(button.accessibleName().casefold())
 
 
 # the run
@@ -298,6 +309,14 @@ class Turns:
         self.window.live.offer(events.Stop(reason="emergency stop"))
         yield from self._until(lambda: self.window.ended is not None)
 
+    def many_answers(self) -> Iterator[str]:
+        self._guns[-1].released.set()
+        yield from self._until(lambda: self.window.drawn.state in (State.SETTING, State.PREPARING))
+        yield from self.fire(State.ASKING)
+        yield "asking for one of six"
+        self.window.live.offer(events.Stop(reason="enough"))
+        yield from self._until(lambda: self.window.ended is not None)
+
     def rearming(self) -> Iterator[str]:
         yield from self.at(State.REARMING)
         yield "rearming"
@@ -330,6 +349,7 @@ def carry_out(folder: Path, sizes: list[tuple[int, int]]) -> dict[str, list[str]
             ("direction", Turns.direction, "ask"),
             ("preference", Turns.preference, "ask"),
             ("preference", Turns.rearming, "resume"),
+            ("many answers", Turns.many_answers, "fresh"),
         ):
             one_run(experiment, Path(results), again, Turns(guns), turns, look)
     return found
@@ -372,6 +392,11 @@ def _setup(experiment: str) -> Any:
     """A short run of an experiment, with an instruction that takes two lines."""
     if experiment == "preference":
         return changed("preference", console={"guard_s": 0.0})
+    if experiment == "many answers":
+        felt = {answer: f"a {answer}" for answer in ("kick", "knock", "push", "tap", "buzz")} | {"nothing": "nothing"}
+        setup = direction_with(sets=1, console={"guard_s": 0.0})
+        asked = QuestionConfig(kind="choice", text="What did it feel like?", answers=tuple(felt), labels=felt)
+        return replace(setup, config=setup.config.model_copy(update={"questions": {"response": asked}}))
     return direction_with(
         ("vibration", "asymmetric-2"),
         sets=2,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from PyQt6 import QtWidgets
-from PyQt6.QtCore import Qt
+from PyQt6 import QtGui, QtWidgets
+from PyQt6.QtCore import QEvent, Qt
 from PyQt6.QtGui import QMouseEvent
 
 from experiments.screens.console import widgets
@@ -96,24 +96,98 @@ class Slots(QtWidgets.QWidget):
                 widget.setVisible(widget in shown)
 
 
-class AnswerButtons(QtWidgets.QWidget):
-    """Buttons side by side for some of the answers."""
+_TYPES = ("", "smaller", "smallest")
+"""The sizes of an answer's type, as the style sheet has them; capitals are of the largest alone."""
+
+
+class AnswerButton(CommandButton):
+    """A button of an answer in one of the sizes of type. `changed` is called where its room or its type has changed."""
+
+    def __init__(self, name: Name, mouse: Mouse, changed: Callable[[], None], size: str = "") -> None:
+        self._changed = changed
+        super().__init__(name, mouse, "large")
+        self.setProperty("type", size)
+
+    def lines(self, told: str, width_px: int) -> str:
+        """An answer as it stands on a button of this type that is so wide; empty if it has no room."""
+        room_px, metrics = self._room_px(width_px), self.fontMetrics()
+        shown = Qt.TextFlag.TextShowMnemonic.value
+        return button_lines(self._cased(told), lambda line: metrics.size(shown, line).width() <= room_px)
+
+    def cut(self, told: str, width_px: int) -> str:
+        """As much of an answer as has room in one line."""
+        return self.fontMetrics().elidedText(self._cased(told), Qt.TextElideMode.ElideRight, self._room_px(width_px))
+
+    def _cased(self, told: str) -> str:
+        return told if self.property("type") else told.upper()
+
+    def _room_px(self, width_px: int) -> int:
+        self.ensurePolished()
+        option, style = QtWidgets.QStyleOptionButton(), self.style()
+        self.initStyleOption(option)
+        option.rect.setWidth(width_px)
+        inner = QtWidgets.QStyle.SubElement.SE_PushButtonContents
+        return width_px if style is None else style.subElementRect(inner, option, self).width()
+
+    def resizeEvent(self, event: QtGui.QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Its room has changed."""
+        super().resizeEvent(event)
+        self._changed()
+
+    def changeEvent(self, event: QEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Its type may have changed."""
+        super().changeEvent(event)
+        if event is not None and event.type() in {QEvent.Type.FontChange, QEvent.Type.StyleChange}:
+            self._changed()
+
+
+class AnswerButtons:
+    """Buttons of the answers, half of them on each of two `sides`, in the largest type that has room for all."""
 
     def __init__(self, mouse: Mouse) -> None:
-        super().__init__()
-        self._buttons = [CommandButton(name, mouse, "large") for name in ANSWERS]
-        across = widgets.fill(QtWidgets.QHBoxLayout(self))
-        for button in self._buttons:
-            across.addWidget(button, 1)
+        self.sides = QtWidgets.QWidget(), QtWidgets.QWidget()
+        self._choices: tuple[Choice, ...] = ()
+        self._fits = False
+        self._buttons = [[AnswerButton(name, mouse, self._fit) for name in ANSWERS] for _ in self.sides]
+        self._sizes = [AnswerButton("help", mouse, self._fit, size) for size in _TYPES]
+        for side, buttons in zip(self.sides, self._buttons, strict=True):
+            across = widgets.fill(QtWidgets.QHBoxLayout(side))
+            for button in buttons:
+                across.addWidget(button, 1)
+        for size in self._sizes:  # these are only measured
+            size.setParent(self.sides[0])
+            size.hide()
 
-    def put(self, choices: Sequence[Choice], shown: range) -> None:
-        """Show the answers at these places among the choices."""
-        for place, button in enumerate(self._buttons):
-            button.setVisible(place in shown)
-            if place in shown:
-                button.label(button_lines(choices[place].told, len(shown)), choices=choices)
-                button.setAccessibleName(choices[place].told)
-                button.setToolTip(choices[place].told)
+    def put(self, choices: Sequence[Choice]) -> None:
+        """Show the answers."""
+        if self._choices == tuple(choices):
+            return
+        self._choices = tuple(choices)
+        half = (len(choices) + 1) // 2
+        for buttons, shown in zip(self._buttons, (range(half), range(half, len(choices))), strict=True):
+            for place, button in enumerate(buttons):
+                button.setVisible(place in shown)
+                if place in shown:
+                    button.setAccessibleName(choices[place].told)
+                    button.setToolTip(choices[place].told)
+        self._fit()
+
+    def _fit(self) -> None:
+        if self._fits or not self._choices:
+            return
+        self._fits = True  # a change of type is heard of as well
+        half = (len(self._choices) + 1) // 2
+        placed = [(self._buttons[place >= half][place], choice.told) for place, choice in enumerate(self._choices)]
+        able = [(button, told) for button, told in placed if self._sizes[-1].lines(told, button.width())]
+        size = next(one for one in self._sizes if all(one.lines(told, button.width()) for button, told in able))
+        for button, told in placed:
+            if button.property("type") != size.property("type"):
+                button.setProperty("type", size.property("type"))
+                widgets.restyle(button)
+                button.updateGeometry()
+            width_px = button.width()
+            button.label(size.lines(told, width_px) or size.cut(told, width_px), choices=self._choices)
+        self._fits = False
 
 
 _LEFT: tuple[Name, ...] = ("damper", "restart")
@@ -139,9 +213,10 @@ class Buttons:
 
     def __init__(self, mouse: Mouse) -> None:
         self._large = {name: CommandButton(name, mouse, "large") for name in (*_LEFT, *_MIDDLE, *_RIGHT)}
-        self._answers = AnswerButtons(mouse), AnswerButtons(mouse)
+        self._answers = AnswerButtons(mouse)
         left, middle, right = ([self._large[name] for name in names] for names in (_LEFT, _MIDDLE, _RIGHT))
-        self.slots = Slots([self._answers[0], *left], middle, [self._answers[1], *right])
+        answers_left, answers_right = self._answers.sides
+        self.slots = Slots([answers_left, *left], middle, [answers_right, *right])
         self._row = {name: CommandButton(name, mouse) for name in _ROW}
         self.row = QtWidgets.QWidget()
         row = [*((button, 2) for button in self._row.values()), (CommandButton("emergency", mouse, "stop"), 5)]
@@ -158,11 +233,9 @@ class Buttons:
         asks = bool(choices) and position.state in (State.ASKING, State.CORRECTING)
         hidden = {"fire"} if idle("fire") else set[str]()  # nobody is shown to fire a gun that does not answer
         large: set[QtWidgets.QWidget] = {button for name, button in self._large.items() if name in shown - hidden}
-        self.slots.show_only(large | set(self._answers if asks else ()))
-        half = (len(choices) + 1) // 2
+        self.slots.show_only(large | set(self._answers.sides if asks else ()))
         if asks:
-            self._answers[0].put(choices, range(half))
-            self._answers[1].put(choices, range(half, len(choices)))
+            self._answers.put(choices)
         for name, button in self._large.items():
             enters = phrase("It was told") if position.state is State.INFORMING else phrase("End the run")
             button.label(enters if name == "enter" else "", letters=letters)

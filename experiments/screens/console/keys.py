@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from textwrap import wrap
 from typing import Literal, get_args
 
 from experiments.design.config import DesignConfig
@@ -293,25 +292,28 @@ def shown_key(name: Name, *, letters: bool, choices: Sequence[Choice] = ()) -> s
 
 _BUTTON_LETTERS = 18
 """So many letters have room side by side on the large buttons of one side."""
+_BUTTON_LINES = 2
 
 
-def button_lines(told: str, beside: int) -> str:
-    r"""An answer as it stands on one of so many buttons side by side, in two lines at most; empty if it has no room.
+def button_lines(told: str, has_room: Callable[[str], bool]) -> str:
+    r"""An answer in the lines of a button, as few as hold it; empty if it has no room.
 
-    >>> button_lines("forward", 1), button_lines("rather far", 2), button_lines("a little stronger", 2)
-    ('FORWARD', 'RATHER\nFAR', '')
+    >>> def eight(line): return len(line) <= 8
+    >>> button_lines("rather far", eight), button_lines("far", eight), button_lines("a little stronger", eight)
+    ('rather\nfar', 'far', '')
     """
-    room = _BUTTON_LETTERS // beside - 2 * (beside > 1)
-    lines = wrap(told.upper(), max(1, room), break_long_words=False)
-    return "\n".join(lines) if len(lines) <= 2 and max(map(len, lines), default=0) <= room else ""
+    lines = list[str]()
+    for word in told.split():
+        joined = f"{lines[-1]} {word}" if lines else word
+        lines[-1:] = [joined] if has_room(joined) else [*lines[-1:], word]
+    return "\n".join(lines) if len(lines) <= _BUTTON_LINES and all(map(has_room, lines)) else ""
 
 
 def is_on_buttons(choices: Sequence[Choice]) -> bool:
-    """Whether every answer stands whole on its button."""
+    """Whether every answer stands whole on its button, in large type."""
     beside = (len(choices) + 1) // 2
-    return all(
-        " ".join(button_lines(one.told, beside).split()) == " ".join(one.told.upper().split()) for one in choices
-    )
+    room = _BUTTON_LETTERS // beside - 2 * (beside > 1)
+    return all(button_lines(one.told, lambda line: len(line) <= room) for one in choices)
 
 
 def why_not(name: Name, position: Position) -> str:
