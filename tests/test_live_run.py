@@ -17,6 +17,7 @@ from experiments.live_run import EventVerdict, RunStopped
 from experiments.record import storage
 from experiments.record.journal import JournalError
 from experiments.record.replay import history
+from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_question
 from experiments.screens.texts import again_text
 from experiments.session import events
 from experiments.session import remarks as words
@@ -991,6 +992,18 @@ def test_an_emergency_stop_during_the_test_shot_owes_another_one(tmp_path: Path)
 # ends
 
 
+AGAIN = "Presented again, for the second time. Its answers so far stay in the journal and do not count."
+
+
+def test_a_stop_while_a_trial_has_open_questions_says_that_its_answers_will_not_count(tmp_path: Path) -> None:
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        trial = sitting.live.moment.trial
+        assert line_question("stop", trial, sitting.live, kept=True) == LINE_QUESTIONS["stop"]
+        sitting.to(S.ASKING)
+        said = line_question("stop", trial, sitting.live, kept=True)
+    assert said.endswith(f"Resumed, it presents trial {trial.trial} again: answers of it so far do not count.")
+
+
 def test_the_last_set_can_be_corrected_and_repeated_until_the_run_is_ended(tmp_path: Path) -> None:
     with sat(DIRECTION, tmp_path) as sitting:
         sitting.to(S.CLOSING)
@@ -1001,7 +1014,7 @@ def test_the_last_set_can_be_corrected_and_repeated_until_the_run_is_ended(tmp_p
         assert sitting.state is S.CLOSING
         assert by_hand(sitting, events.Repeat(reason="a noise"))
         assert sitting.position.base in (S.SETTING, S.PREPARING)
-        assert again_text(sitting.live.history, prepare(sitting)) == "Presented again, for the second time."
+        assert again_text(sitting.live.history, prepare(sitting)) == AGAIN
         sitting.to(S.CLOSING)
         contents, rows = to_the_end(sitting)
     assert (rows[-2]["response"], rows[-2]["flags"]) == ("backward", "corrected")

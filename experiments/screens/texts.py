@@ -92,10 +92,18 @@ def short_place(trial: Trial, here: Trial) -> str:
 
 
 def again_text(told: History, step: Prepare) -> str:
-    """How often a trial was felt before this attempt, as the table counts attempts; empty if never."""
-    felt = sum(is_attempt(one, word) for one, word in told if trial_of(one) == step.trial)
-    before = felt - (step.interval > 0)  # the first shot of this one is among them
-    return phrase("Presented again, for the {nth} time.", nth=_nth(before + 1)) if before else ""
+    """How often a trial was felt before this attempt, as the table counts attempts; empty if never.
+
+    What was answered of it, and said to be saved, counts no more: that is told as well.
+    """
+    own = [(one, word) for one, word in told if trial_of(one) == step.trial]
+    before = sum(is_attempt(one, word) for one, word in own) - (step.interval > 0)  # the first shot is of this attempt
+    if not before:
+        return ""
+    again = phrase("Presented again, for the {nth} time.", nth=_nth(before + 1))
+    if not any(isinstance(one, Asking) and isinstance(word, steps.Answered) for one, word in own):
+        return again
+    return phrase("{again} Its answers so far stay in the journal and do not count.", again=again)
 
 
 def _nth(number: int) -> str:

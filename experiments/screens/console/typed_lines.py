@@ -11,6 +11,7 @@ from experiments.session import events
 from experiments.session.events import Event
 from experiments.session.history import trial_at
 from experiments.session.remarks import flag_word
+from experiments.session.steps import is_begun
 
 LINE_QUESTIONS: dict[keys.Name, str] = {
     "end break": phrase("Why does the break end early?"),
@@ -26,6 +27,11 @@ def line_question(name: keys.Name, trial: Trial, live: LiveRun, *, kept: bool) -
     """What is asked above the line that a command needs; `kept`: the run is no practice and no training."""
     if name == "stop" and not kept:
         return phrase("Why does it stop here? It is begun anew each time.")
+    if name == "stop" and is_begun(live.position.step):
+        return phrase(
+            "Why does the run stop here? Resumed, it presents trial {trial} again: answers of it so far do not count.",
+            trial=trial.trial,
+        )
     place = short_place(trial, trial_at(live.plan, live.history, live.position.step))
     return LINE_QUESTIONS[name].format(trial=trial.trial, place=place)
 
