@@ -298,8 +298,8 @@ _BUTTON_LINES = 2
 def button_lines(told: str, has_room: Callable[[str], bool]) -> str:
     r"""An answer in the lines of a button, as few as hold it; empty if it has no room.
 
-    >>> def eight(line): return len(line) <= 8
-    >>> button_lines("rather far", eight), button_lines("far", eight), button_lines("a little stronger", eight)
+    >>> eight = lambda line: len(line) <= 8
+    >>> button_lines("rather far", eight), button_lines("far", eight), button_lines("astonishing", eight)
     ('rather\nfar', 'far', '')
     """
     lines = list[str]()
