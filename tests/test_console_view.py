@@ -18,6 +18,7 @@ from device.words import GunState, GunStatus
 from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig
+from experiments.design.language import LARGEST_NUMBER
 from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import damper
 from experiments.load import load_setup
@@ -489,6 +490,13 @@ def test_no_time_has_gone_by_before_the_run_begins() -> None:
 def test_a_rating_is_taken_as_it_was_typed_or_not_at_all(grain: float, typed: str, meant: float | str) -> None:
     scale = replace(rate(plan_of(PREFERENCE).trials[0]), grain=grain)
     assert typed_rating(typed, scale) == meant
+
+
+def test_what_is_no_number_or_rank_is_told_as_such_with_its_bounds_in_full() -> None:
+    any_number = replace(rate(plan_of(PREFERENCE).trials[0]), grain=0.0, minimum=0.001, maximum=LARGEST_NUMBER)
+    assert typed_rating("hard", any_number) == "Not a number: type a number from 0.001 to 1,000,000,000."
+    rank = replace(any_number, grain=1.0, minimum=1.0, maximum=8.0, distinct=True)
+    assert typed_rating("9", rank) == "Not a rank: type a number from 1 to 8."
 
 
 @pytest.mark.parametrize("state", [State.SETTING, State.PREPARING])

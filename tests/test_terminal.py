@@ -145,7 +145,7 @@ def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Pa
         for count, typed in enumerate(("11", "-1", "much", "nan", ""), start=1):
             screen.wait_for("for no answer:", count)
             screen.type(typed)
-            screen.wait_for("Not a rating", count)
+            screen.wait_for("Not a rating: type a number from 0 to 10. `none` is no answer.", count)
         screen.wait_for("for no answer:", 6)
         screen.type("7.25")  # nothing is rounded: what is kept is what was said
         screen.wait_for("It goes in steps of 0.1: type 7.2 or 7.3.")

@@ -362,7 +362,8 @@ def _typed_rating(line: str, asked: Rate) -> float | str | None:
     """The rating that a line says, `None` for no answer; or what to say if it is none."""
     if line.lower() == "none":
         return None
-    return texts.typed_rating(line, asked)
+    said = texts.typed_rating(line, asked)
+    return f"{said} `none` is no answer." if isinstance(said, str) and asked.may_be_skipped else said
 
 
 def _how(entry: Asking) -> str:

@@ -17,7 +17,7 @@ from experiments.session import remarks, steps
 from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
-from experiments.tasks.questions import AnswerValue, Scale, on_scale
+from experiments.tasks.questions import AnswerValue, on_scale
 
 FLAG_RULE = phrase("A flag is a word of at most {max_flag} letters, digits and hyphens.", max_flag=MAX_FLAG)
 
@@ -297,7 +297,12 @@ def _with_thousands(text: str) -> float:
     return float(text.replace(",", "")) if _THOUSANDS.fullmatch(text) else math.nan
 
 
-def typed_rating(text: str, scale: Scale) -> float | str:
+def _number_kind(asked: Rate) -> str:
+    """What a number that is asked for is called."""
+    return phrase("rank") if asked.distinct else phrase("rating") if asked.grain else phrase("number")
+
+
+def typed_rating(text: str, scale: Rate) -> float | str:
     """A number as people type it, comma or point, if it lies on the scale; else what to say.
 
     Nothing is rounded: what is kept is what was said.
@@ -315,7 +320,12 @@ def typed_rating(text: str, scale: Scale) -> float | str:
             thousands=thousands,
         )
     if not scale.minimum <= number <= scale.maximum:
-        return phrase("Not a rating: type a number from {low:g} to {high:g}.", low=scale.minimum, high=scale.maximum)
+        return phrase(
+            "Not a {kind}: type a number from {low:,.15g} to {high:,.15g}.",
+            kind=_number_kind(scale),
+            low=scale.minimum,
+            high=scale.maximum,
+        )
     if number == (nearest := on_scale(number, scale)):
         return nearest
     other = on_scale(nearest + math.copysign(scale.grain, number - nearest), scale)
