@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
 from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name
-from analysis.logs.journals import Beside, beside, journal_of
+from analysis.logs.journals import Beside, journal_beside, journal_of
 from analysis.logs.names import gun_labels
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
@@ -66,13 +66,13 @@ def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
     _check_plan(design, head.plan, rows)
     _check_times(design, rows)
     _check_onsets(rows)
-    journal_beside = beside(data, path, content)
+    beside = journal_beside(data, path, content)
     return DesignLog(
         code=code,
         design=design,
         key=_key(design),
         rows=rows,
-        journal=journal_beside,
+        journal=beside,
         gun_labels=gun_labels(head),
     )
 

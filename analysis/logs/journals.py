@@ -128,10 +128,10 @@ def compared(path: str, content: bytes) -> Beside | None:
         data = storage.read_whole(where)
     except OSError as error:
         return Beside(f"its journal cannot be read ({error.strerror}), so nothing proves the table")
-    return beside(data, path, content)
+    return journal_beside(data, path, content)
 
 
-def beside(data: bytes, path: str, content: bytes) -> Beside:
+def journal_beside(data: bytes, path: str, content: bytes) -> Beside:
     """The journal of a table, by its bytes. Raises as `compared`."""
     said = compared_with(data, path, content)
     return Beside(said, setup=_in_head(_SETUP, data), original=_in_head(_ORIGINAL, data))
