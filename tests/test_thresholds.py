@@ -261,6 +261,21 @@ def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
         assert all(0 <= box.x0 < box.x1 <= figure.bbox.width for box in legends)
 
 
+def test_few_levels_have_each_a_tick_below_their_functions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    config = load_setup("detection").config
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))
+    summary = summarise(config, simulated(config, loaded("detection")[1], 6))
+    found = summary.questions["felt"].thresholds
+    assert found is not None
+    with figure_files.full_size():
+        figure_functions(summary, found, tmp_path / "never")
+        lowest = [axes for axes in shown[0].axes if axes.get_visible()][-1]
+        assert [tick.get_text() for tick in lowest.get_xticklabels()] == ["0.003", "0.004", "0.005"]
+        assert lowest.get_xticks().tolist() == [0.003, 0.004, 0.005]
+        assert figure_files.touching(shown[0]) == []
+
+
 def test_an_interval_that_reaches_below_what_any_level_can_be_is_told() -> None:
     config = load_setup("threshold").config
     rows = [
