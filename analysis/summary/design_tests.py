@@ -21,7 +21,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import Level, QuestionConfig, shown_level
 
 
-def tests_of_conditions(
+def condition_tests(
     design: DesignConfig, question: QuestionConfig, people: pd.DataFrame, group: pd.Series | None
 ) -> Iterator[DesignTest]:
     """What differs between conditions, by as many factors as there are."""

@@ -17,7 +17,7 @@ import pandas as pd
 
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
-from analysis.summary.design_tests import tests_of_conditions
+from analysis.summary.design_tests import condition_tests
 from analysis.summary.pairs import paired_comparison
 from analysis.summary.question_results import ConditionSummary, QuestionSummary
 from analysis.summary.results import DesignSummary, Origin
@@ -129,7 +129,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
     cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, apart)))
     conditions = {_named_condition(some, factors): some for some in _conditions(found.real, factors) if factors}
     tests = (
-        *tests_of_conditions(design, question, people, _groups(design, found.real)),
+        *condition_tests(design, question, people, _groups(design, found.real)),
         *(() if design.adapted else sensitivity(design.trial.kind, question, scored, conditions)),
     )
     return QuestionSummary(
