@@ -136,6 +136,35 @@ def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_l
     assert all(int(row["shots"]) >= 1 for row in table)
 
 
+def test_a_bare_command_where_words_are_typed_is_asked_about_before_it_is_stored_as_words(
+    quick_configs: Path, tmp_path: Path
+) -> None:
+    with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
+        for trial in range(3):
+            screen.fire(trial + 1)
+            screen.wait_for("says next:", trial + 1)
+            screen.type("")
+        screen.wait_for("for no answer:")
+        screen.type("5")
+        asked = "As a command that is `/undo`. If it is what was said, type `undo` again."
+        screen.wait_for("in your own words.")
+        screen.type("undo")
+        screen.wait_for(asked)
+        screen.type("like a toy")
+        screen.wait_for("Saved. Feedback 1 of 3: “comment”.")
+        screen.wait_for("for no answer:", 2)
+        screen.type("undo")
+        screen.wait_for("Correct the “comment” of")
+        screen.type("undo")
+        screen.wait_for(asked, 2)
+        screen.type("undo")
+        screen.wait_for("“comment” corrected.")
+        screen.wait_for("for no answer:", 3)
+        screen.type("stop")
+        assert screen.end() == 130
+    assert [row["comment"] for row in rows(tmp_path, "preference_ratings") if row["comment"]] == ["undo"]
+
+
 def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
         for trial in range(3):

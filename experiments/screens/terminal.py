@@ -67,6 +67,7 @@ class TerminalScreen:
         self._live: LiveRun | None = None
         self._shown, self._serial = Position(), -1
         self._gone = False
+        self._doubted = "", -1
 
     def begin(self, live: LiveRun) -> None:
         """Say who it is, and begin to read."""
@@ -209,6 +210,9 @@ class TerminalScreen:
         free = words or _answers(position, line)
         if word in _COMMANDS and (line.startswith("/") or not free):
             return _command(word, rest.strip())
+        if words and line.lower() in _COMMANDS and self._doubted != (line, position.serial):
+            self._doubted = line, position.serial
+            return f"As a command that is `/{word}`. If it is what was said, type `{line}` again."
         if "!" in line and not free:  # behind what was half typed
             return events.EmergencyStop()
         return _line(line, position, now_s)

@@ -167,8 +167,10 @@ def about_text(plan: Plan, asked: Asking, messages: ParticipantMessages = ENGLIS
 
 
 def entry_name(told: History, entry: Asking) -> str:
-    """What an entry is called: with its question's name where several of its kind are asked."""
+    """What an entry is called: with its question's name where several of its kind are asked, words always by that."""
     kind = what(entry)
+    if isinstance(entry, Describe):
+        return f"“{entry.question}”"
     alike = {step.question for step, _ in told if isinstance(step, Asking) and what(step) == kind}
     return f"{kind} “{entry.question}”" if len(alike) > 1 else kind
 
@@ -189,9 +191,11 @@ def entry_text(plan: Plan, told: History, entry: Asking) -> str:
 def corrected_text(told: History, remark: remarks.EntryCorrected) -> str:
     """That something was corrected, and to what; of words only that they were."""
     entry = asked_before(told, remark)
-    if entry is None or isinstance(entry, Describe):
-        return phrase("description corrected")
+    if entry is None:
+        return phrase("corrected")
     value, name = value_text(entry, remark.value), entry_name(told, entry)
+    if isinstance(entry, Describe):
+        return phrase("{entry} corrected", entry=name)
     if name == "answer":
         return phrase("corrected to {value}", value=value)
     return phrase("{entry} corrected to {value}", entry=name, value=value)
@@ -226,8 +230,9 @@ def saved_text(plan: Plan, told: History, step: Step | None, word: Outcome | Rem
 
 
 def _entered_text(plan: Plan, told: History, step: Asking, value: AnswerValue) -> str:
-    said = "description" if isinstance(step, Describe) else value_text(step, value)
-    return f"{_which(plan, told, step)}: {isolated(said)}"
+    if isinstance(step, Describe):
+        return f"{about_text(plan, step)}: {entry_name(told, step)}"
+    return f"{_which(plan, told, step)}: {isolated(value_text(step, value))}"
 
 
 def _remark_text(plan: Plan, told: History, remark: Outcome | Remark) -> str:
@@ -254,9 +259,10 @@ def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -
     entry = asked_before(told, remark)
     if entry is None:
         return ""
-    about = _which(plan, told, entry)
     if isinstance(entry, Describe):
-        return phrase("Saved. {about}: description corrected.", about=about)
+        name = entry_name(told, entry)
+        return phrase("Saved. {about}: {entry} corrected.", about=about_text(plan, entry), entry=name)
+    about = _which(plan, told, entry)
     return phrase("Saved. {about} corrected to {value}.", about=about, value=value_text(entry, remark.value))
 
 

@@ -89,7 +89,7 @@ def _still_asked(about: About, step: Asking) -> Iterator[str]:
         place, kind = texts.ordinal(about.plan, trial), design.questions[name].kind
         if kind == "text":
             same = trial == step.trial
-            yield phrase("its description") if same else phrase("description: {ordinal}", ordinal=place)
+            yield phrase("its “{name}”", name=name) if same else phrase("“{name}”: {ordinal}", name=name, ordinal=place)
         elif kind in ("choice", "yes-no"):
             yield phrase("answer: {ordinal}", ordinal=place)
         else:
