@@ -15,6 +15,8 @@ from experiments.tasks.questions import on_scale
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
+NOTHING_TO_UNDO = "There is nothing to undo in this set."
+NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,11 +148,11 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
         case events.Fire() | events.Rearm() if moment.gun_silence:
             return f"See to the gun first: {moment.gun_silence.rstrip('.')}."
         case events.Undo() if moment.further_back is None:
-            return "There is nothing to undo in this set."
+            return NOTHING_TO_UNDO
         case events.Undo() if moment.further_back == moment.position.correcting:
             return "There is nothing further back in this set."
         case events.Repeat() if moment.repeatable is None:
-            return "There is no trial of this set to repeat now."
+            return NOTHING_TO_REPEAT
         case events.Repeat(trial=Trial() as trial) if trial != moment.repeatable:
             return f"Trial {trial.trial} cannot be presented again any more."
         case events.Rearm(held_s=float() as held_s) if held_s < REARM_HELD_S:

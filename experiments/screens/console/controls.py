@@ -18,7 +18,7 @@ from experiments.screens.texts import FLAG_RULE, typed_line, typed_rating
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
 from experiments.session.history import chosen_levels, entered_value
-from experiments.session.judging import REARM_HELD_S
+from experiments.session.judging import NOTHING_TO_REPEAT, NOTHING_TO_UNDO, REARM_HELD_S
 from experiments.session.states import ARMED, EMERGENCY, Position, State
 from experiments.session.steps import Ask, Asking, Rate, what
 from experiments.tasks.questions import AnswerValue, Choice
@@ -257,11 +257,11 @@ class Controls:
 
     def _nothing_to(self, name: keys.Name) -> str:
         if name == "repeat" and self._live.moment.repeatable is None:
-            return phrase("There is no trial of this set to repeat now.")
+            return NOTHING_TO_REPEAT
         if name == "fire" and self._live.gun_silence:
             return phrase("See to the gun first.")
         if name == "undo" and self._live.moment.further_back is None:
-            return phrase("There is nothing to undo in this set.")
+            return NOTHING_TO_UNDO
         return ""
 
     # what is entered
