@@ -99,7 +99,7 @@ def _button_holds(button: Any) -> bool:
 
 
 def _says_its_answer(button: Any) -> bool:
-    words = " ".join(button.text().split()).casefold()
+    words = " ".join(re.sub("&(.)", r"\1", button.text()).split()).casefold()  # as Qt shows it
     return getattr(button, "name", None) not in ANSWERS or words.startswith(button.accessibleName().casefold())
 
 
@@ -393,7 +393,8 @@ def _setup(experiment: str) -> Any:
     if experiment == "preference":
         return changed("preference", console={"guard_s": 0.0})
     if experiment == "many answers":
-        felt = {answer: f"a {answer}" for answer in ("kick", "knock", "push", "tap", "buzz")} | {"nothing": "nothing"}
+        felt = {answer: f"a {answer}" for answer in ("kick", "knock", "push", "tap", "buzz")}
+        felt |= {"nothing": "on & off"}
         setup = direction_with(sets=1, console={"guard_s": 0.0})
         asked = QuestionConfig(kind="choice", text="What did it feel like?", answers=tuple(felt), labels=felt)
         return replace(setup, config=setup.config.model_copy(update={"questions": {"response": asked}}))

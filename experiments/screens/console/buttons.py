@@ -59,7 +59,7 @@ class CommandButton(QtWidgets.QPushButton):
         """Show what it does, and its key below."""
         key = shown_key(self.name, letters=letters, choices=choices)
         shown = "\n".join(filter(None, (text or BY_NAME[self.name].text, f"[{key}]")))
-        if shown != self.text():
+        if (shown := shown.replace("&", "&&")) != self.text():  # one alone would mark a key of Qt's
             self.setText(shown)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
@@ -111,8 +111,7 @@ class AnswerButton(CommandButton):
     def lines(self, told: str, width_px: int) -> str:
         """An answer as it stands on a button of this type that is so wide; empty if it has no room."""
         room_px, metrics = self._room_px(width_px), self.fontMetrics()
-        shown = Qt.TextFlag.TextShowMnemonic.value
-        return button_lines(self._cased(told), lambda line: metrics.size(shown, line).width() <= room_px)
+        return button_lines(self._cased(told), lambda line: metrics.size(0, line).width() <= room_px)
 
     def cut(self, told: str, width_px: int) -> str:
         """As much of an answer as has room in one line."""
