@@ -40,47 +40,66 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EarlierRun:
-    """What stands where a run is to be: a run to go on with, or one that gives way to a new one, for a reason."""
+    """What stands where a run is to be: a run to go on with, or one that gives way to a new one, for a reason.
+
+    `size_bytes`: of the journal as it was looked at.
+    """
 
     before: Contents | None = None
     gives_way: bool = False
     reason: str = ""
+    size_bytes: int = 0
 
 
 def earlier_run(where: Place, request: RunRequest) -> EarlierRun:
     """What stands there. Nothing is moved yet: the gun, the sensor or the plan may be refused."""
     if not where.journal.exists():
         return EarlierRun()
-    anew = request.again == "fresh" or request.practice
-    try:
-        contents = begun(where.journal)
-    except JournalError:
-        if not anew:
-            raise
-        contents = None
-    if contents is not None:
-        folders.check_own(where, contents.plan)
+    contents = _read(where, request)
     if contents is not None and _gives_way(contents, request):
-        request, anew = replace(request, anew_reason=GAVE_WAY), True
-    else:
-        _refuse_finished(where, contents)
-    os.close(hold_journal(where.journal))  # refused while another run is at it
-    if contents is not None and not anew:
+        return EarlierRun(gives_way=True, reason=GAVE_WAY, size_bytes=_size_of_held(where))
+    _refuse_finished(where, contents)
+    size_bytes = _size_of_held(where)  # refused while another run is at it
+    if contents is not None and not _is_anew(request):
         if request.again == "ask":
             raise UnfinishedRun(where, contents)
         return EarlierRun(before=contents)
-    _refuse_unsaid(where, contents, request)
-    return EarlierRun(gives_way=True, reason=request.anew_reason)
+    if contents is not None and contents.head.participant == "person" and (count := answers_in(contents)):
+        _refuse_unsaid(request, f"{where.journal}: has answers: {count}")
+    return EarlierRun(gives_way=True, reason=request.anew_reason, size_bytes=size_bytes)
 
 
-def _refuse_unsaid(where: Place, contents: Contents | None, request: RunRequest) -> None:
-    """`PlaceError`: what a person answered is set aside, and nobody says why."""
-    if contents is None or request.practice or request.anew_reason or contents.head.participant != "person":
-        return
-    if count := answers_in(contents):
-        raise PlaceError(
-            f"{where.journal}: has answers: {count}; --fresh sets them aside, so say why with --reason TEXT"
-        )
+def _is_anew(request: RunRequest) -> bool:
+    return request.again == "fresh" or request.practice
+
+
+def _read(where: Place, request: RunRequest) -> Contents | None:
+    """What a run has written; `None` if that is nothing, or cannot be read and is to be set aside."""
+    try:
+        contents = begun(where.journal)
+    except JournalError as error:
+        if not _is_anew(request):
+            raise
+        _refuse_unsaid(request, str(error))
+        return None
+    if contents is not None:
+        folders.check_whose(where, contents.plan)
+    return contents
+
+
+def _refuse_unsaid(request: RunRequest, what: str) -> None:
+    """`PlaceError`: what may be a person's answers is set aside, and nobody says why."""
+    if not (request.practice or request.anew_reason):
+        raise PlaceError(f"{what}; --fresh sets them aside, so say why with --reason TEXT")
+
+
+def _size_of_held(where: Place) -> int:
+    """How long a journal is that no other run is at. `JournalError`, if one is."""
+    descriptor = hold_journal(where.journal)
+    try:
+        return os.fstat(descriptor).st_size
+    finally:
+        os.close(descriptor)
 
 
 GAVE_WAY = "a synthetic run, which gave way to a person's"
@@ -92,11 +111,15 @@ def _gives_way(contents: Contents, request: RunRequest) -> bool:
     return synthetic and not request.simulated and not request.practice and request.again != "resume"
 
 
-def give_way(where: Place, reason: str, clock: Clock) -> None:
-    """Set aside what stands there, with the reason on record before anything is moved."""
-    os.close(hold_journal(where.journal))  # nobody went on with it meanwhile
-    if reason:
-        one = register.entry("set-aside", where.participant_id, experiment=where.experiment, reason=reason)
+def give_way(where: Place, earlier: EarlierRun, clock: Clock) -> None:
+    """Set aside what stands there, with the reason on record before anything is moved.
+
+    `JournalError` if it is not what was looked at any more: another run is at it, went on with it or took its place.
+    """
+    if _size_of_held(where) != earlier.size_bytes:
+        raise JournalError(f"{where.journal}: another run wrote to it just now; look again and start anew")
+    if earlier.reason:
+        one = register.entry("set-aside", where.participant_id, experiment=where.experiment, reason=earlier.reason)
         register.append(where.results, one, clock)
     folders.set_aside(where)
 

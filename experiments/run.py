@@ -81,9 +81,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
     place = _place(request, registered)
     if not place.journal.exists():
         request = replace(request, anew_reason="")
-    _refuse_excluded(place, registered)
-    if request.practice:
-        folders.refuse_without_practice(setup)
+    _refuse_person(request, place, registered)
     earlier = earlier_run(place, request)
     before = earlier.before
     with _open_gun(request, stimuli, clock) as gun, ExitStack() as turn:
@@ -144,7 +142,10 @@ def _let_go(gun: Gun, why: BaseException) -> None:
 _POWER = "switch off its power"
 
 
-def _refuse_excluded(place: Place, registered: Register) -> None:
+def _refuse_person(request: RunRequest, place: Place, registered: Register) -> None:
+    """`PlaceError` for whoever is excluded, and for a practice where there is none."""
+    if request.practice:
+        folders.refuse_without_practice(request.setup)
     reason = registered.excluded().get(place.participant_id)
     if reason is not None:
         raise PlaceError(
@@ -231,7 +232,7 @@ def _open(place: Place, earlier: EarlierRun, clock: Clock, *, each: bool) -> Jou
         clock.go_on_after(earlier.before.records[-1].utc)
         return Journal.reopen(earlier.before, clock, each=each)
     if earlier.gives_way:
-        give_way(place, earlier.reason, clock)
+        give_way(place, earlier, clock)
     folders.make_results(place.folder)
     return Journal.create(place.journal, clock, each=each)
 

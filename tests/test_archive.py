@@ -208,7 +208,11 @@ def test_a_redacted_journal_follows_from_its_own_lines_and_names_the_original(
     for path in sorted(archive.rglob("*_journal.jsonl")):
         original = study / path.relative_to(archive)
         head, lines = raw(path)[0], original.read_bytes().splitlines()
-        assert head["redacted_from"]["last_line_sha256"] == hashlib.sha256(lines[-1]).hexdigest()
+        assert head["redacted_from"] == {
+            "format": 1,
+            "first_line_sha256": hashlib.sha256(lines[0]).hexdigest(),
+            "last_line_sha256": hashlib.sha256(lines[-1]).hexdigest(),
+        }
         assert len(raw(path)) == len(lines)
         if read_journal(path).finished:
             of_table, itself = ending_of(path.read_bytes())

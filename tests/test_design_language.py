@@ -103,6 +103,7 @@ def asked(**keys):
         ({"questions": asked(keys={"first": "F1"})}, "questions.q.keys.first = 'F1'"),
         ({"questions": asked(labels={"first": "one", "second": "one"})}, "'one' stands for more than one answer"),
         ({"questions": asked(labels={"first": "second"})}, "'second' stands for more than one answer"),
+        ({"questions": asked(labels={"first": "Same", "second": "same"})}, "'Same', 'same' stands for more than one"),
         (
             {"factors": ONE | {"grip": {"levels": ["one", "two"], "labels": {"one": "firm", "two": "firm"}}}},
             "factors.grip.labels: 'firm' stands for more than one level",

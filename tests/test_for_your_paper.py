@@ -141,7 +141,7 @@ def test_of_a_design_dropped_trials_and_stopped_runs_are_told_with_who_was_analy
     (tmp_path / "rules.toml").write_text("[trials]\ndrop_unanswered = true\n")
     said = quotes(reported(results, rules=tmp_path / "rules.toml"))
     assert "The run of 1 of the 3 was stopped before its end; what was answered up to there is analysed." in said
-    assert "Of 36 recorded trials 6 (16.7 %) were dropped: 6 without an answer." in said
+    assert "Of 36 planned trials 6 (16.7 %) were dropped: 6 without an answer." in said
 
 
 def test_who_is_listed_by_hand_is_told_so_though_a_rule_would_leave_them_out(

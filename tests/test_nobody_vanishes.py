@@ -25,6 +25,7 @@ from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
+from experiments.study.folders import place, set_aside
 from recoil.session import rebuild_table
 from tests.conftest import Recoil, refused
 from tests.lies import journal, lines, table
@@ -311,6 +312,31 @@ def test_a_run_that_went_on_since_it_was_archived_counts_once(tmp_path: Path) ->
     table(results, "preference").unlink()
     ran(results, again="resume")
     assert path.read_bytes().startswith(whole)
+    assert read_logs([tmp_path]).files == (table(results, "preference"),)
+
+
+def test_of_archives_of_different_dates_and_of_an_archive_of_an_archive_each_run_counts_once(tmp_path: Path) -> None:
+    study, results = tmp_path / "study", tmp_path / "study" / "results"
+    rebuild_table(broken_off(results, "P01", 40))
+    export_archive(ArchiveRequest(folder=study, out=tmp_path / "half"))
+    table(results, "preference").unlink()
+    ran(results, again="resume")
+    export_archive(ArchiveRequest(folder=study, out=tmp_path / "whole"))
+    export_archive(ArchiveRequest(folder=tmp_path / "whole", out=tmp_path / "twice"))
+    whole = table(tmp_path / "whole" / "results", "preference")
+    for paths in ([tmp_path / "half", tmp_path / "whole"], [tmp_path / "whole", tmp_path / "half"]):
+        assert read_logs(paths).files == (whole,)
+    assert read_logs([study, tmp_path / "twice"]).files == (table(results, "preference"),)
+
+
+def test_a_run_that_was_set_aside_does_not_come_back_by_an_older_archive(tmp_path: Path) -> None:
+    results = tmp_path / "study" / "results"
+    path = broken_off(results, "P01", 40)
+    rebuild_table(path)
+    export_archive(ArchiveRequest(folder=tmp_path / "study", out=tmp_path / "archive"))
+    set_aside(place(results, "P01", "preference"))
+    ran(results)
+    assert path.with_name(f"{path.stem}.aside-1.jsonl").exists()
     assert read_logs([tmp_path]).files == (table(results, "preference"),)
 
 

@@ -15,11 +15,13 @@ from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessage
 from experiments.design.plan import Trial, condition
 from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
+from experiments.screens.console.view import Message, ParticipantSeen
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.messages import BETWEEN, Focused, line
+from experiments.screens.participant.messages import BETWEEN, Focused, NoiseEnded, NoiseIs, line
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
 from tests.asked import describe, rate
+from tests.at_controls import sat
 from tests.waiting import PATIENCE_S, wait_for
 
 SETUP = load_setup("preference")
@@ -131,6 +133,22 @@ def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened(
     finally:
         link.close()
     assert heard == [Focused(on=True)]
+
+
+def test_noise_that_ended_before_anybody_listened_is_said_once_the_run_begins(tmp_path: Path) -> None:
+    word = line(NoiseEnded(message="Masking noise has ended")).decode().strip()
+    program = f"import sys, time; print({word!r}, flush=True); sys.stdin.read()"
+    link = ParticipantLink.start(command=(sys.executable, "-c", program))
+    playing = NoiseIs(on=True, message="")
+    side = ParticipantSide(link, lambda: link, SETUP, rates=True, own_keys=False, noise=playing)
+    told: list[Message] = []
+    try:
+        wait_for(lambda: link.noise_ended)
+        with sat(SETUP, tmp_path) as sitting:
+            assert side.begin(sitting.live, told.append) == "Masking noise has ended"
+    finally:
+        link.close()
+    assert [one.noise_off for one in told if isinstance(one, ParticipantSeen)][-1]
 
 
 def test_the_program_is_started_again_once_however_often_it_is_asked_for(tmp_path: Path) -> None:

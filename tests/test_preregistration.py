@@ -478,7 +478,7 @@ def test_why_the_rules_leave_somebody_out_is_not_frozen_and_no_deviation(study: 
     assert of_kind(told(study), "analysis") == []
     (study / "rules.toml").write_text(RULES + person.replace("P02", "P03"))
     assert [(one.key, one.frozen, one.now) for one in freeze_status(study).changes] == [
-        ("excluded.1.code", "P02", "P03")
+        ("excluded.0.code", "P02", "P03")
     ]
     again = freeze(study, "a slip", RealClock())
     assert "seizure" not in again.file.read_text() + again.page.read_text()

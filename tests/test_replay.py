@@ -406,6 +406,32 @@ def test_a_fresh_run_whose_sensor_is_refused_leaves_the_unfinished_one_where_it_
     refused_anew(tmp_path, "--sensor csv:nowhere.csv", sensor="csv:nowhere.csv")
 
 
+def test_a_run_that_another_one_took_the_place_of_meanwhile_is_not_set_aside(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    newer = b"".join(unbroken["preference"].lines[:9])
+
+    def slow_screen(*made: Any) -> Any:
+        journal.write_bytes(newer)
+        return synthetic_screen(*made)
+
+    asked = replace(request("preference", tmp_path, "fresh"), anew_reason="the gun came loose")
+    with pytest.raises(JournalError, match="another run wrote to it just now; look again"):
+        run(asked, slow_screen, VirtualClock())
+    assert journal.read_bytes() == newer
+    assert not register.read_register(tmp_path).entries
+
+
+def test_what_cannot_be_read_is_set_aside_for_a_reason_alone(unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    spoilt = journal.read_bytes().replace(b'"n":3', b'"n":4')
+    journal.write_bytes(spoilt)
+    with pytest.raises(PlaceError, match=r"--fresh sets them aside, so say why with --reason TEXT"):
+        run(request("preference", tmp_path, "fresh"), synthetic_screen, VirtualClock())
+    assert journal.read_bytes() == spoilt
+
+
 @pytest.mark.parametrize("again", ["resume", "fresh", "ask"])
 def test_the_run_of_somebody_who_is_excluded_neither_goes_on_nor_gives_way(
     again: Again, unbroken: dict[str, Unbroken], tmp_path: Path

@@ -112,6 +112,16 @@ def test_a_train_can_be_followed_by_a_choice_which_has_no_time(sitting: Sit, tmp
     assert all(float(row["exposure_s"]) > 0 for row in table)
 
 
+def test_a_key_that_is_shown_is_of_its_own_answer_also_where_another_has_that_name(
+    sitting: Sit, tmp_path: Path
+) -> None:
+    asked = '[questions.which]\nkind = "choice"\ntext = "Which?"\nanswers = ["a", "b"]\n'
+    screen = sitting(_FACTOR + asked + 'labels = { a = "den första", b = "den andra" }\n')
+    says(screen, "", "a", "", "den första", "")
+    assert screen.end() == 0
+    assert [row["which"] for row in rows(tmp_path)] == ["b", "a"]
+
+
 def test_a_trial_of_which_something_was_told_from_memory_is_not_presented_again(sitting: Sit, tmp_path: Path) -> None:
     screen = sitting(_FACTOR + "".join(_RATING.format(name=name, when="block") for name in ("strong", "mild")))
     says(screen, "", "", "7", "repeat slipped")

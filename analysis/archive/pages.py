@@ -63,8 +63,8 @@ Recoil, `sha256sum --check {manifest}` checks the files.
 ## What is redacted
 
 {redacted}
-The first line of each journal holds, as `redacted_from`, the SHA-256 of the last line of the original. That line ends
-the original's own chain of hashes: who keeps the originals can show that nothing else was changed.
+The first line of each journal holds, as `redacted_from`, the SHA-256 of the original's first line and of its last,
+which ends the original's own chain of hashes: who keeps the originals can show that nothing else was changed.
 """
 _HIDDEN = """Participants stand under their codes. In the journals and all that is made from them
 

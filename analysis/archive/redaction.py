@@ -101,8 +101,10 @@ def redacted(path: Path, data: bytes, first: datetime, *, free_text: bool = Fals
     if contents is None:
         raise JournalError(f"{path}: line 1: no whole record")
     lines = data[: contents.whole_bytes].split(b"\n")[:-1]
-    last = hashlib.sha256(lines[-1]).hexdigest()
-    pen = _Pen(path=path, design=began_with(contents.head), first=first, free_text=free_text, original=last)
+    original = {
+        f"{name}_line_sha256": hashlib.sha256(lines[at]).hexdigest() for name, at in (("first", 0), ("last", -1))
+    }
+    pen = _Pen(path=path, design=began_with(contents.head), first=first, free_text=free_text, original=original)
     for number, line in enumerate(lines, start=1):
         try:
             pen.write(parsed_line(line))
@@ -115,14 +117,15 @@ def redacted(path: Path, data: bytes, first: datetime, *, free_text: bool = Fals
 class _Pen:
     """Writes a journal record by record; each stretch of it, from a beginning or a resumption, has clocks of its own.
 
-    `original` is the hash of the last line of the journal that is redacted, `asked` the question that is open.
+    `original` has the hashes of the first and the last line of the journal that is redacted, `asked` the question that
+    is open.
     """
 
     path: Path
     design: DesignConfig
     first: datetime
     free_text: bool
-    original: str
+    original: Mapping[str, str]
     lines: list[bytes] = field(default_factory=list)
     asked: str = ""
     host_s: float = 0.0
@@ -156,7 +159,7 @@ class _Pen:
     def _head(self, value: Mapping[str, object]) -> dict[str, object]:
         setup = without_places(value["setup"])
         laws = {"laws": without_places(value["laws"])} if "laws" in value else {}
-        original = {"format": FORMAT, "last_line_sha256": self.original}
+        original = value.get("redacted_from", {"format": FORMAT, **self.original})
         return {"setup": setup, "setup_sha256": sha256(setup), **laws, "redacted_from": original}
 
     def _part(self, key: str, value: object, asked: str) -> object:

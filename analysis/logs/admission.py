@@ -20,7 +20,7 @@ from analysis.logs.files import (
     results_above,
     seen_from,
 )
-from analysis.logs.journals import Beside, RunFile, holds_line, journal_of
+from analysis.logs.journals import Beside, RunFile, begins_with, journal_of
 from analysis.logs.kinds import IN_REGISTER, kept_out, kinds_of
 from analysis.logs.rules import Log
 from analysis.logs.setups import SetupOfLog, changed_setups
@@ -110,7 +110,7 @@ class LogsSoFar:
     setups: dict[int, str] = field(default_factory=dict)
     """The hash of the setup of each good log that has a journal."""
     originals: dict[int, str] = field(default_factory=dict)
-    """Of each good log whose journal is redacted, the hash of the last line of the original."""
+    """Of each good log whose journal is redacted, the hash of the first line of the original."""
     told: dict[str, list[ToldRows]] = field(default_factory=dict)
     """What the rows of logs tell, by experiment."""
 
@@ -240,13 +240,14 @@ class LogsSoFar:
     def _leave_redacted(self, runs: Iterable[RunFile]) -> None:
         """A log of an archive goes where the journal is that its own was made from, or another that was made from it.
 
-        The original may be of somebody who is left out: nobody comes back by a copy.
+        The original may be of somebody who is left out, or set aside: nobody comes back by a copy. Of several archives
+        the one that has most of the run stays.
         """
         stays, journals = dict[str, str](), self._journals(runs) if self.originals else {}
         redacted = ((self.paths[number // LOGS_A_FILE], number) for number in self.originals if number in self.studies)
-        for path, number in sorted(redacted, key=lambda one: self._in_order(one[0])):
+        for path, number in sorted(redacted, key=lambda one: (-_size(journal_of(one[0])), *self._in_order(one[0]))):
             line, others = self.originals[number], journals[self.codes[number], self.experiments[number]]
-            there = (one for one in others - {journal_of(path)} if holds_line(one, line))
+            there = (one for one in others - {journal_of(path)} if begins_with(one, line))
             first = min(there, key=self._in_order, default="") or stays.setdefault(line, path)
             if first != path:
                 self._leave_copy(number, f"is a redacted copy of the run in {seen_from(first, path)}")
@@ -254,12 +255,13 @@ class LogsSoFar:
     def _journals(self, runs: Iterable[RunFile]) -> Mapping[tuple[str, str], set[str]]:
         """The journals that were found, and those beside logs, good or not, by code and experiment."""
         there = [((run.participant, run.experiment), run.path) for run in runs]
-        there += [((one.participant, one.experiment), str(one.file)) for one in self.problems]
+        there += [((one.participant, one.experiment), journal_of(str(one.file))) for one in self.problems]
         for number in self.studies:
-            there.append(((self.codes[number], self.experiments[number]), self.paths[number // LOGS_A_FILE]))
+            path = journal_of(self.paths[number // LOGS_A_FILE])
+            there.append(((self.codes[number], self.experiments[number]), path))
         found: dict[tuple[str, str], set[str]] = {}
         for key, path in there:
-            found.setdefault(key, set()).add(journal_of(path))
+            found.setdefault(key, set()).add(path)
         return found
 
     def _in_order(self, path: str) -> tuple[int, int, str]:
@@ -309,3 +311,11 @@ class LogsSoFar:
     def _go_together(self, one: int, other: int) -> bool:
         """Whether two logs may come into one table; where nobody answered, a log goes with all."""
         return self.kinds[one] == self.kinds[other] or None in (self.kinds[one], self.kinds[other])
+
+
+def _size(path: str) -> int:
+    """How long a file is; 0 if that cannot be known."""
+    try:
+        return Path(path).stat().st_size
+    except OSError:
+        return 0

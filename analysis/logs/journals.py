@@ -111,7 +111,7 @@ def _refuse_other(run: RunFile, contents: Contents) -> None:
 class Beside(NamedTuple):
     """The journal beside a table: what there is to say of it, empty if all is well, and the hash of its setup.
 
-    `original`: of a redacted one the SHA-256 of the last line of the journal that it was made from.
+    `original`: of a redacted one the SHA-256 of the first line of the journal that it was made from.
     """
 
     said: str
@@ -138,7 +138,7 @@ def journal_beside(data: bytes, path: str, content: bytes) -> Beside:
 
 
 _SETUP = re.compile(rb'"setup_sha256":"([0-9a-f]{64})"')
-_ORIGINAL = re.compile(rb'"redacted_from":\{"format":1,"last_line_sha256":"([0-9a-f]{64})"')
+_ORIGINAL = re.compile(rb'"redacted_from":\{"format":1,"first_line_sha256":"([0-9a-f]{64})"')
 
 
 def _in_head(hash_there: re.Pattern[bytes], data: bytes) -> str:
@@ -147,11 +147,10 @@ def _in_head(hash_there: re.Pattern[bytes], data: bytes) -> str:
     return found[1].decode() if found else ""
 
 
-def holds_line(path: str, line_sha256: str) -> bool:
-    """Whether a journal has a line of this hash: it, or as it was before it went on, ended with that."""
+def begins_with(path: str, line_sha256: str) -> bool:
+    """Whether the first line of a journal has this hash."""
     with suppress(OSError):
-        lines = storage.read_whole(path).split(b"\n")
-        return any(hashlib.sha256(line).hexdigest() == line_sha256 for line in reversed(lines))
+        return hashlib.sha256(storage.read_whole(path).partition(b"\n")[0]).hexdigest() == line_sha256
     return False
 
 

@@ -1,7 +1,7 @@
 """Which tests the report makes of a design, said before there are any data.
 
-It follows from the design alone, as in `design_tests` and `sensitivity` and, for the two experiments of the paper, in
-`summary`.
+It follows from the design alone, as in `design_comparisons` and `sensitivity` and, for the two experiments of the
+paper, in `summary`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from analysis.summary.design_tests import MOST_FACTORS, has_exponent, with_levels_of_their_own
+from analysis.summary.design_comparisons import MOST_FACTORS, has_exponent, with_levels_of_their_own
 from analysis.summary.designs import varied
 from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig

@@ -17,7 +17,7 @@ import pandas as pd
 
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
-from analysis.summary.design_tests import condition_tests
+from analysis.summary.design_comparisons import condition_tests
 from analysis.summary.pairs import paired_comparison
 from analysis.summary.question_results import ConditionSummary, QuestionSummary
 from analysis.summary.results import DesignSummary, Origin

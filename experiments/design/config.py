@@ -300,8 +300,11 @@ def _hand_problems(name: str, factor: FactorConfig) -> Iterator[str]:
     words = isinstance(factor.all_levels[0], str)
     if meant := [own for own in _OWN_NAMES if _is_meant(name, own, words=words)]:
         yield f"did you mean {meant[0]}? What a hand sets needs `sets` for each of its levels, or another name"
-    elif not words and parted(name).unit in {parted(number).unit for number in DRIVEN}:
-        yield f"the gun has no such number; it has {', '.join(GUN_NUMBERS)}"
+    elif not (words or factor.between) and parted(name).unit in {parted(number).unit for number in DRIVEN}:
+        yield (
+            f"the gun has no such number; it has {', '.join(GUN_NUMBERS)}; what a hand sets needs `sets` for each "
+            "of its levels, or a name with another unit"
+        )
 
 
 def _is_meant(name: str, own: str, *, words: bool) -> bool:

@@ -385,7 +385,8 @@ def _number_problems(question: QuestionConfig) -> Iterator[str]:
 
 
 def _doubled(key: str, values: Sequence[str], of: str) -> Iterator[str]:
-    doubled = sorted({value for value in values if values.count(value) > 1})
+    alike = [value.casefold() for value in values]
+    doubled = sorted({value for value in values if alike.count(value.casefold()) > 1})
     if doubled:
         yield f"{key}: {', '.join(map(repr, doubled))} stands for more than one {of}; give each its own"
 

@@ -279,10 +279,14 @@ def _keys(asked: Ask) -> str:
 
 
 def _chosen(asked: Ask, line: str) -> str | None:
-    """The answer that a line means: by its key, its name or its label."""
+    """The answer that a line means: by its key, which is what is shown, else by its label or its name."""
     typed = line.casefold()
-    named = ((one.answer, (one.key, one.answer.casefold(), one.label.casefold())) for one in asked.choices)
-    return next((answer for answer, names in named if typed in names), None)
+    names = [
+        *((one.key, one.answer) for one in asked.choices),
+        *((one.label.casefold(), one.answer) for one in asked.choices),
+        *((one.answer.casefold(), one.answer) for one in asked.choices),
+    ]
+    return next((answer for name, answer in names if name == typed), None)
 
 
 def _no_answer(asked: Ask) -> str:

@@ -347,7 +347,7 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
     if contents is None:
         return RunProgress(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
     plan = contents.plan
-    check_own(where, plan)
+    check_whose(where, plan)
     head, told, design = contents.head, replay.history(contents), began_with(contents.head)
     state: RunState = "done" if contents.finished else "open elsewhere" if elsewhere else "in progress"
     return RunProgress(
@@ -362,7 +362,7 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
     )
 
 
-def check_own(where: Place, plan: Plan) -> None:
+def check_whose(where: Place, plan: Plan) -> None:
     """`JournalError` if the journal that stands there has the plan of another participant or experiment."""
     if (plan.participant_id, plan.experiment) != (where.participant_id, where.experiment):
         raise JournalError(

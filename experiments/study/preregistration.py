@@ -130,11 +130,12 @@ def as_frozen(path: Path) -> FileValues:
 
     What is frozen is published, and its hash lets nothing be taken out of it later.
     """
-    values = read_toml(path)
+    return _without_reasons(read_toml(path))
+
+
+def _without_reasons(values: FileValues) -> FileValues:
     listed = values.get("excluded")
-    if isinstance(listed, list):
-        values["excluded"] = [_without_reason(one) for one in listed]
-    return values
+    return {**values, "excluded": [_without_reason(one) for one in listed]} if isinstance(listed, list) else values
 
 
 def _without_reason(entry: JsonValue) -> JsonValue:
@@ -162,7 +163,7 @@ def changes(frozen: Files, now: Files) -> tuple[KeyChange, ...]:
 
 def changed_keys(file: str, frozen: FileValues, now: FileValues) -> Iterator[KeyChange]:
     """The keys of one file that differ."""
-    before, after = dict(_leaves(frozen)), dict(_leaves(now))
+    before, after = (dict(_leaves(_without_reasons(values))) for values in (frozen, now))
     for key in dict.fromkeys([*before, *after]):
         if before.get(key) != after.get(key) or isinstance(before.get(key), bool) != isinstance(after.get(key), bool):
             yield KeyChange(file=file, key=key, frozen=before.get(key), now=after.get(key))

@@ -175,7 +175,9 @@ def _sensitivity_words(question: QuestionSummary) -> Iterator[str]:
     of_all = {test.name: test for test in reversed(question.tests) if test.name in _SENSITIVITY}
     if "d_prime" in of_all:
         corrected = " with the log-linear correction" if question.detected else ""
-        told = f"All participants' answers together gave d′ = {apa.number(of_all['d_prime'].statistic)}{corrected}"
+        one = max(cell.people for cell in question.cells) == 1
+        whose = "The participant's answers" if one else "All participants' answers together"
+        told = f"{whose} gave d′ = {apa.number(of_all['d_prime'].statistic)}{corrected}"
         own = of_all.get("d_prime_mean")
         yield f"{told}; the participants' own: {_mean_and_interval(own)}." if own else f"{told}."
 
@@ -186,7 +188,8 @@ def _exponent_words(test: DesignTest, *, exact: bool) -> str:
 
 
 def _mean_and_interval(test: DesignTest) -> str:
-    return f"M = {apa.number(test.statistic)}, 95 % CI {apa.interval(test.ci_low, test.ci_high)}"
+    interval = "" if test.ci_low is None else f", 95 % CI {apa.interval(test.ci_low, test.ci_high)}"
+    return f"M = {apa.number(test.statistic)}{interval}"
 
 
 _WITH_UNIT = re.compile(r"[A-Za-z]\w*_(?:V|s|N|A|ohm|m|kg|Hz)\b")

@@ -97,7 +97,8 @@ def trials_dropped(report: ReportData, experiment: str) -> str:
         return f"The rules of exclusion dropped none of {how_many(recorded, 'trial')}."
     told = ", ".join(f"{count:,} {rule}" for rule, count in _trial_words(rules, counts))
     share, were = apa.percent(gone / recorded), "was" if gone == 1 else "were"
-    return f"Of {how_many(recorded, 'recorded trial')} {gone:,} ({share}) {were} dropped: {told}."
+    trials = "planned trial" if report.stopped.get(experiment) else "recorded trial"  # not all of them took place
+    return f"Of {how_many(recorded, trials)} {gone:,} ({share}) {were} dropped: {told}."
 
 
 def dropped_by_rule(people: Mapping[str, Mapping[str, int]]) -> Counter[str]:

@@ -178,7 +178,10 @@ class AnswerButtons:
         half = (len(self._choices) + 1) // 2
         placed = [(self._buttons[place >= half][place], choice.told) for place, choice in enumerate(self._choices)]
         able = [(button, told) for button, told in placed if self._sizes[-1].lines(told, button.width())]
-        size = next(one for one in self._sizes if all(one.lines(told, button.width()) for button, told in able))
+        sizes = (
+            self._sizes if len(able) == len(placed) else self._sizes[-1:]
+        )  # what has no room is cut where most of it stands
+        size = next(one for one in sizes if all(one.lines(told, button.width()) for button, told in able))
         for button, told in placed:
             if button.property("type") != size.property("type"):
                 button.setProperty("type", size.property("type"))

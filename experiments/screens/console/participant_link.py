@@ -144,13 +144,18 @@ class ParticipantSide:
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
         """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
         self._live, self._tell, self.planned = live, tell, len(live.plan.trials)
-        self._see()
         self._link.listen(self._heard, self._gone)
+        if self._noise is not None and self._link.noise_ended is not None:  # before anybody listened
+            self._noise = messages.NoiseIs(on=False, message=self._link.noise_ended.message)
+        self._see()
         return self._noise_told()
 
-    def _see(self, *, focused: bool = False, failure: str = "") -> None:
+    def _see(self) -> None:
+        """Tell the console how the participant's screen stands."""
+        focused, failure = self._link.focused, self._link.failure or ""
+        has_keys = focused is not None and focused.on and not failure
         noise_off = self._noise is not None and not self._noise.on
-        self._tell(ParticipantSeen(focused=focused, failure=failure, noise_off=noise_off))
+        self._tell(ParticipantSeen(focused=has_keys, failure=failure, noise_off=noise_off))
 
     def _noise_told(self) -> str:
         """What the record is to say of the noise, if anything; the console hears that it stays off."""
@@ -307,7 +312,7 @@ class ParticipantSide:
             case messages.EmergencyPressed():
                 self._offer(events.EmergencyStop(by="participant"))
             case messages.Focused():
-                self._see(focused=word.on)
+                self._see()
             case messages.NoiseEnded() if self._live is not None:
                 self._noise = messages.NoiseIs(on=False, message=word.message)
                 self._see()
@@ -322,7 +327,7 @@ class ParticipantSide:
     def _gone(self, cause: str) -> None:
         """The program has ended, and was not told to."""
         if not self._closed:
-            self._see(failure=cause)
+            self._see()
             self._offer(events.ParticipantLost(cause=cause))
 
     @property
@@ -353,6 +358,7 @@ class ParticipantSide:
         self._offer(events.ParticipantBack())
         if self._noise is not None:
             self._noise = noise_of(link)  # that of the program before ended with it
+            self._see()
         if self._live is not None:
             if noise := self._noise_told():
                 self._live.remark(Noted(trial=None, text=noise))

@@ -97,6 +97,8 @@ class ParticipantLink:
         self._page = threading.Lock()
         self.focused: messages.Focused | None = None
         """Whose the keys are, as far as it was said."""
+        self.noise_ended: messages.NoiseEnded | None = None
+        """That the noise has ended, if it has; it may have before anybody listened."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
         self._heard: Callable[[messages.Unasked], None] = lambda _: None
@@ -265,6 +267,7 @@ class ParticipantLink:
             self._failed(f"the participant's screen failed: {word.message}")
         elif isinstance(word, messages.Unasked):
             self.focused = word if isinstance(word, messages.Focused) else self.focused
+            self.noise_ended = word if isinstance(word, messages.NoiseEnded) else self.noise_ended
             self._heard(word)
         else:
             self._mail.put(word)
