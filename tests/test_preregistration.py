@@ -11,6 +11,7 @@ from shutil import copytree
 
 import pytest
 
+from analysis.archive.archive_export import ArchiveRequest, export_archive
 from analysis.archive.making import preregistration_faults
 from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
@@ -617,6 +618,12 @@ def test_a_freeze_in_an_archive_is_held_against_the_journals_there(begun: Path) 
     assert faults_in_archive(begun) == []
     forged(begun / "preregistration" / "preregistration-1.json", "value")
     assert preregistration_faults(begun)[0].startswith("preregistration/preregistration-1.json: was edited")
+
+
+def test_an_archive_is_not_held_against_a_freeze_that_stands_elsewhere_in_it(begun: Path, tmp_path: Path) -> None:
+    archive = tmp_path / "archive"
+    export_archive(ArchiveRequest(folder=begun, out=archive, include_synthetic=True))
+    assert deviations(read_logs([archive / "results"]), AnalysisFiles()) == ((), ())
 
 
 @pytest.mark.parametrize("whole", ["[]", "5", "NaN", '"text"'])

@@ -17,7 +17,6 @@ from analysis.archive.making import (
     REQUESTS_FILE,
     RESULTS,
     RULES_FILE,
-    SETTINGS,
     ArchiveSettings,
     analysis_of,
     bids_files,
@@ -25,7 +24,7 @@ from analysis.archive.making import (
 )
 from analysis.archive.pages import CITATION, ArchivedDesign
 from analysis.logs.exclusion_rules import Rules
-from analysis.logs.files import BadLogError, Problem, code_in_name, experiment_in_name
+from analysis.logs.files import ARCHIVE_FILE, BadLogError, Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.logs.setups import setup_differences
@@ -217,7 +216,7 @@ def _write_analysis(
         if given is not None:
             data = given.read_bytes() if request.free_text else redaction.redacted_config(given)
             placing.write_file(part, path, data)
-    placing.write_file(part, SETTINGS, as_json(settings))
+    placing.write_file(part, ARCHIVE_FILE, as_json(settings))
     analyze(replace(analysis_of(part, settings), extra=(left_out,)), progress=progress)
 
 

@@ -7,13 +7,14 @@ from typing import Literal
 
 from analysis.archive import bids_export
 from analysis.archive.contents import left_out_in
+from analysis.logs.files import ARCHIVE_FILE
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request
 from experiments.config.door import Model, Text, checked_table, read_text
 from experiments.record import journal
 from experiments.study import preregistration
 
-SETTINGS, RESULTS, ANALYSIS, BIDS = "archive.json", "results", "analysis", "bids"
+RESULTS, ANALYSIS, BIDS = "results", "analysis", "bids"
 PREREGISTRATION = "preregistration"
 RULES_FILE, REQUESTS_FILE = f"{ANALYSIS}/rules.toml", f"{ANALYSIS}/requests.toml"
 
@@ -29,7 +30,7 @@ class ArchiveSettings(Model):
 
 def read_settings(folder: Path) -> ArchiveSettings:
     """How an archive was made. `ConfigError` if its file does not say so."""
-    path = folder / SETTINGS
+    path = folder / ARCHIVE_FILE
     return checked_table(ArchiveSettings, bids_export.read_json(path), path, read_text(path))
 
 

@@ -11,6 +11,8 @@ from pathlib import Path, PurePath
 from device.words import RecoilError, escaped
 from experiments.record import storage, tables
 
+ARCHIVE_FILE = "archive.json"
+"""What a folder that is an archive has, beside the results in it."""
 ENDINGS = tuple(f"_{suffix}.csv" for suffix in tables.FILE_SUFFIX.values())
 _CODE = re.compile(r"sub-([^_]+)_")
 _TASK = re.compile(r"_task-([a-z]+)_[^/\\]*$")

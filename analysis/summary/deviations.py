@@ -11,6 +11,7 @@ from typing import Literal
 
 from pydantic import JsonValue
 
+from analysis.logs.files import ARCHIVE_FILE
 from analysis.logs.journals import RunFile, journal_of, run_file
 from analysis.logs.reading import Logs
 from device.words import how_many
@@ -146,7 +147,9 @@ class _Looked:
 
     @classmethod
     def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
-        """`None` of a study that was never frozen."""
+        """`None` of a study that was never frozen, and of an archive, which has not what it is held against."""
+        if (results.parent / ARCHIVE_FILE).exists():
+            return None
         chain = read_chain(results.parent)
         if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
             return None

@@ -182,7 +182,9 @@ def tallies_of(folder: Path, shards: Mapping[Path, Shard], job: Job) -> dict[int
 def _others(shards: Mapping[Path, Shard], job: Job) -> Iterator[str]:
     differing = {path: one.job.unlike(job) for path, one in shards.items()}
     own = [path for path, how in differing.items() if not how]
-    as_these = f", as {len(own):,} of {len(shards):,} here are ({own[0]} is the first)" if own else ""
+    as_these = (
+        f", as {len(own):,} of {len(shards):,} here are ({own[0]} is the first)" if 2 * len(own) > len(shards) else ""
+    )
     remedy = "run it again as the job's others, or move it away"
     yield from (
         f"{path}: is no shard of this job ({how}){as_these}; {remedy}" for path, how in differing.items() if how
