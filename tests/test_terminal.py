@@ -114,15 +114,20 @@ def test_a_run_whose_table_cannot_be_written_as_it_stops_says_that_nothing_is_lo
     assert [row["response"] for row in rows(tmp_path, "direction_trials") if row["response"]] == ["forward", "backward"]
 
 
+def all_are_felt(screen: AtTerminal) -> None:
+    """The three trains of experiment 2, each until somebody says next."""
+    for trial in range(1, 4):
+        screen.fire(trial)
+        screen.wait_for("says next:", trial)
+        screen.type("")
+        screen.wait_for("Presented and saved.", trial)
+
+
 def test_experiment_2_with_a_rating_of_zero_no_answer_and_a_comment_that_looks_like_a_formula(
     quick_configs: Path, tmp_path: Path
 ) -> None:
     with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
-        for trial in range(3):
-            screen.fire(trial + 1)
-            screen.wait_for("says next:", trial + 1)
-            screen.type("")
-            screen.wait_for("Presented and saved.", trial + 1)
+        all_are_felt(screen)
         for trial, (rating, comment) in enumerate((("0", "=1+1"), ("none", ""), ("7,5", 'a "toy", said she'))):
             screen.wait_for("for no answer:", trial + 1)
             screen.type(rating)
@@ -140,10 +145,7 @@ def test_a_bare_command_where_words_are_typed_is_asked_about_before_it_is_stored
     quick_configs: Path, tmp_path: Path
 ) -> None:
     with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
-        for trial in range(3):
-            screen.fire(trial + 1)
-            screen.wait_for("says next:", trial + 1)
-            screen.type("")
+        all_are_felt(screen)
         screen.wait_for("for no answer:")
         screen.type("5")
         asked = "As a command that is `/undo`. If it is what was said, type `undo` again."
@@ -167,10 +169,7 @@ def test_a_bare_command_where_words_are_typed_is_asked_about_before_it_is_stored
 
 def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Path) -> None:
     with AtTerminal(run(quick_configs, "preference"), tmp_path) as screen:
-        for trial in range(3):
-            screen.fire(trial + 1)
-            screen.wait_for("says next:", trial + 1)
-            screen.type("")
+        all_are_felt(screen)
         for count, typed in enumerate(("11", "-1", "much", "nan", ""), start=1):
             screen.wait_for("for no answer:", count)
             screen.type(typed)

@@ -155,7 +155,7 @@ class App:
         now_s = self._stage.toolkit.now()
         if now_s - self._listened_s >= _LISTEN_S:
             self._listened_s = now_s
-            if (ended := self._noise.has_ended()) is not None:
+            if (ended := self._noise.ended()) is not None:
                 self._wire.say(ended)
 
     def _obey(self, word: messages.ToParticipant) -> None:

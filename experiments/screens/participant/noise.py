@@ -30,7 +30,7 @@ class MaskingNoise:
             return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
         return messages.NoiseIs(on=True, message="", ask=asked.ask)
 
-    def has_ended(self) -> messages.NoiseEnded | None:
+    def ended(self) -> messages.NoiseEnded | None:
         """What is to be said where it was on and ended by itself: a sound device that is gone ends its stream."""
         if self._sound is None or self._sound.stream._sdStream.active:
             return None
