@@ -5,10 +5,10 @@ Importing this package is cheap; the physics and its libraries are imported when
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from device.machine_clock import machine_s
 from device.words import (
     DeviceError,
     Effect,
@@ -47,7 +47,7 @@ def open_gun(
     address: str,
     parameters: GunParameters | Mapping[str, Method] | None = None,
     *,
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] = machine_s,
 ) -> Gun:
     """A disarmed gun at `address`, "simulated" or "serial:PORT"; "serial:auto" looks for the one that answers.
 

@@ -8,6 +8,7 @@ from contextlib import suppress
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Protocol
 
+from device.machine_clock import machine_s
 from device.words import AWAKE_S
 
 
@@ -44,7 +45,7 @@ class RealClock:
 
     def now(self) -> float:
         """Monotonic time in seconds."""
-        return time.monotonic() * self._speed
+        return machine_s() * self._speed
 
     def utc(self) -> str:
         """Date and time in UTC."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from itertools import cycle, islice
 
 from device import open_gun
+from device.machine_clock import machine_s
 from device.methods import Method, drive_of, paper_methods
 from device.plugin.guard import GunLeftOpen, PluginSilent, answer_within, interrupts_held, start_aside
 from device.plugin.reports import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S
@@ -109,7 +110,7 @@ def rig_at(
     clock: Callable[[], float] = StillClock()
     wait = clock.wait if isinstance(clock, StillClock) else time.sleep
     if speed is not None:
-        clock, wait = (lambda: time.monotonic() * speed), (lambda seconds: time.sleep(max(0.0, seconds) / speed))
+        clock, wait = (lambda: machine_s() * speed), (lambda seconds: time.sleep(max(0.0, seconds) / speed))
     return ConformanceRig(
         open_gun=lambda: open_gun(address, methods, clock=clock),
         clock=clock,
@@ -280,7 +281,7 @@ def _trials(rig: ConformanceRig, gun: Gun) -> str:
 
 def _recovered(gun: Gun) -> GunStatus:
     """How a gun stands that failed in a trial: as a run does, it is disarmed and asked until it answers again."""
-    end_s = time.monotonic() + RECOVERED_S
+    end_s = machine_s() + RECOVERED_S
     while True:
         try:
             gun.disarm()
@@ -288,7 +289,7 @@ def _recovered(gun: Gun) -> GunStatus:
         except PluginSilent:
             raise
         except LinkError as error:
-            _expect(time.monotonic() < end_s, f"after a failure it does not answer for {RECOVERED_S:g} s: {error}")
+            _expect(machine_s() < end_s, f"after a failure it does not answer for {RECOVERED_S:g} s: {error}")
             time.sleep(0.1)
 
 

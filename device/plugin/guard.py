@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, wait
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ from types import FrameType, MappingProxyType
 from typing import TypeVar
 
 from device.limits import DriveHistory, planned_start_s
+from device.machine_clock import machine_s
 from device.methods import Method, rendering_of
 from device.plugin.reports import HANDED_OVER_S, PluginOrder, broken_rule, broken_status, is_line, plain_report
 from device.words import (
@@ -125,8 +125,8 @@ def interrupts_held() -> Iterator[None]:
 
 def wait_awake(done: Future[_Answer], seconds: float) -> None:
     """Wait for a result, at most for so long; interrupts come through."""
-    end_s = time.monotonic() + seconds
-    while not done.done() and (left_s := end_s - time.monotonic()) > 0:
+    end_s = machine_s() + seconds
+    while not done.done() and (left_s := end_s - machine_s()) > 0:
         wait([done], min(left_s, AWAKE_S))
 
 

@@ -11,6 +11,7 @@ from collections import deque
 
 import numpy as np
 
+from device.machine_clock import machine_s
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorSaid, asked_of, said_line
 from device.sensor.process import (
@@ -36,7 +37,7 @@ def serve_sensor(address: str, out: int) -> None:
     """Read the sensor, and answer what stdin asks. `DeviceError`, `ValueError`: why it ended."""
     asked: queue.SimpleQueue[ShotAsked] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(asked,), daemon=True).start()  # first, as opening may hang
-    sensor = open_sensor(address, time.monotonic)
+    sensor = open_sensor(address, machine_s)
     try:
         buffer, silence = SampleBuffer(), SensorSilence()
         _become_ready(sensor, buffer, silence)
@@ -58,7 +59,7 @@ def serve_sensor(address: str, out: int) -> None:
 
 def _read(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> float:
     """Take what it gives; back comes when it was asked."""
-    asked_s = time.monotonic()
+    asked_s = machine_s()
     silence.ask()
     try:
         said: object = sensor.read()
@@ -68,7 +69,7 @@ def _read(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> float
         raise SensorError(f"it broke off: {said_by(error)}") from error
     samples = checked_samples("read", said, buffer.last_s)
     silence.answered(len(samples))
-    buffer.take(samples, time.monotonic())
+    buffer.take(samples, machine_s())
     return asked_s
 
 
@@ -77,10 +78,10 @@ _WHY = {False: "is it on?", True: "does its time go, in seconds?"}
 
 
 def _become_ready(sensor: Sensor, buffer: SampleBuffer, silence: SensorSilence) -> None:
-    end_s = time.monotonic() + FIRST_SAMPLES_S
+    end_s = machine_s() + FIRST_SAMPLES_S
     while buffer.length_s < SAMPLES_S:
         _read(sensor, buffer, silence)
-        if time.monotonic() > end_s:
+        if machine_s() > end_s:
             heard = bool(np.isfinite(buffer.last_s))
             raise SensorError(f"it gave {buffer.length_s:.2f} s of samples in {FIRST_SAMPLES_S:g} s: {_WHY[heard]}")
         time.sleep(_RANDOM.uniform(*READ_EVERY_S))
@@ -94,7 +95,7 @@ def _watch(sensor: Sensor, silence: SensorSilence, out: int) -> None:
     silent, dropped = False, 0
     while True:
         time.sleep(LOOK_EVERY_S)
-        if silent != (silent := silence.look(time.monotonic())):
+        if silent != (silent := silence.look(machine_s())):
             os.write(out, said_line(SensorSaid(silent=silent)))
         if isinstance(sensor, CsvSensor) and dropped != (dropped := sensor.dropped):
             os.write(out, said_line(SensorSaid(dropped=dropped)))

@@ -9,13 +9,13 @@ import json
 import queue
 import subprocess
 import threading
-import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Protocol
 
 from pydantic import TypeAdapter, ValidationError
 
+from device.machine_clock import machine_s
 from device.methods import Method
 from device.plugin.door import own_program
 from device.sensor.process import UNHEARD_S, SensorReady, ShotAsked, ShotReply
@@ -117,7 +117,7 @@ class SensorLink:
             self._process.stdin.flush()
         except OSError:
             pass  # it has ended, and says why below
-        soon_s = max(time.monotonic(), pulse_start_s) + _LONGEST_S + UNHEARD_S
+        soon_s = max(machine_s(), pulse_start_s) + _LONGEST_S + UNHEARD_S
         for until_s in (soon_s, soon_s + SENSOR_ANSWER_S):
             reply = self._answer_until(until_s)
             if reply is not None:
@@ -130,7 +130,7 @@ class SensorLink:
         """The answer on the last shot, if it comes in time; others are late, of shots while it was silent."""
         with suppress(queue.Empty):
             while True:
-                reply = self._heard(until_s - time.monotonic()).reply
+                reply = self._heard(until_s - machine_s()).reply
                 if reply is None or reply.number > self._count:
                     raise SensorError(f"{self.address}: answered another shot than it was asked for")
                 if reply.number == self._count:

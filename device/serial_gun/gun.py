@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from device.limits import DriveHistory, planned_start_s
+from device.machine_clock import machine_s
 from device.methods import Method
 from device.serial_gun.lines import CommandRefused, Disconnected, SerialPort, TimedOut, Unsure, WrongVersion
 from device.serial_gun.link import PLAIN_NAME, Link
@@ -292,8 +293,8 @@ def probe(port: str) -> Named | None:
         return None
     try:
         line.write(b"\n*IDN?\n")
-        splitter, end_s = Splitter(), time.monotonic() + PROBE_S
-        while time.monotonic() < end_s:
+        splitter, end_s = Splitter(), machine_s() + PROBE_S
+        while machine_s() < end_s:
             for answer in splitter.feed(line.read()):
                 if answer and answer.startswith(PLAIN_NAME):
                     return Named.parse(answer.decode("latin-1"))

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
+from device.machine_clock import machine_s
 from device.serial_gun import lines
 from device.wire.errors import WireError, message
 from device.wire.records import WIRE_VERSION, Frame, Garbled, Named, Splitter, decode, encode, following, named_value
@@ -57,7 +58,7 @@ class Link:
         self._port: lines.Port | None = None
         self._splitter = Splitter()
         self._pending = lines.Pending()
-        self._number = int(time.monotonic() * 1e3) % 0xFFFF
+        self._number = int(machine_s() * 1e3) % 0xFFFF
         self._token = 0
         self.written_s = self._heard_s = 0.0
         self._trouble: LinkError | None = None
@@ -73,9 +74,9 @@ class Link:
         """Connect for the first time. `LinkError`: there is no port, no gun, or one of another version."""
         self.thread.start()
         self.keeper.start()
-        end_s = time.monotonic() + patience_s
+        end_s = machine_s() + patience_s
         while not self._up.wait(0.005):
-            if self._failed.is_set() or time.monotonic() > end_s:
+            if self._failed.is_set() or machine_s() > end_s:
                 trouble = self._trouble or lines.TimedOut(f"the gun did not answer within {patience_s:g} s")
                 self.close()
                 raise trouble
@@ -88,7 +89,7 @@ class Link:
     @property
     def silent_for_s(self) -> float:
         """How long nothing was written, in seconds of the real world."""
-        return time.monotonic() - self.written_s
+        return machine_s() - self.written_s
 
     def wait_up(self, patience_s: float) -> None:
         """Wait until the gun is there. `Disconnected`: it does not come back."""
@@ -161,7 +162,7 @@ class Link:
         port = self._open_port(self._find())
         with self.lock:
             self._port, self._splitter, self._broken = port, Splitter(), False
-            self._heard_s = time.monotonic()
+            self._heard_s = machine_s()
         self._introduce(port)
         token = self._token + 1 if self._token else int(time.time() * 1e3) % 2**32 + 1
         before = named_value(self._greet(f"SYST:STRI {token}").body, "STRI")
@@ -198,8 +199,8 @@ class Link:
         for _ in range(GREETING_TRIES):
             self._plain = b""
             port.write(b"\n*IDN?\n")
-            end_s = time.monotonic() + PATIENCE_S
-            while not self._plain and time.monotonic() < end_s and not self.closing.is_set():
+            end_s = machine_s() + PATIENCE_S
+            while not self._plain and machine_s() < end_s and not self.closing.is_set():
                 self._pump()
             try:
                 self._check(Named.parse(self._plain.decode("latin-1")))
@@ -225,8 +226,8 @@ class Link:
         trouble: LinkError | None = None
         for _ in range(GREETING_TRIES):
             waiting = self._write(body)
-            end_s = time.monotonic() + PATIENCE_S
-            while not waiting.ended.is_set() and time.monotonic() < end_s and not self.closing.is_set():
+            end_s = machine_s() + PATIENCE_S
+            while not waiting.ended.is_set() and machine_s() < end_s and not self.closing.is_set():
                 self._pump()
             try:
                 return self._pending.outcome(waiting)
@@ -239,7 +240,7 @@ class Link:
             if self._port is None or self._broken:
                 raise lines.Disconnected(f"the gun is not there ({self._trouble or 'no answer'})")
             self._number = following(self._number)
-            now_s = time.monotonic()
+            now_s = machine_s()
             waiting = lines.Waiting(
                 number=self._number,
                 body=body,
@@ -254,8 +255,8 @@ class Link:
                 self._pending.take(waiting.number)
                 self._lose(error)
                 raise
-            waiting.gap_s += time.monotonic() - now_s
-            self.written_s = time.monotonic()
+            waiting.gap_s += machine_s() - now_s
+            self.written_s = machine_s()
         return waiting
 
     def _pump(self) -> None:
@@ -266,7 +267,7 @@ class Link:
         data = port.read()
         received_s = self._clock()
         for line in self._splitter.feed(data):
-            self._heard_s = time.monotonic()
+            self._heard_s = machine_s()
             self._take(line, received_s)
 
     def _take(self, line: bytes | None, received_s: float) -> None:
@@ -317,7 +318,7 @@ class Link:
 
     def _look_after(self) -> None:
         """Notice a gun that says nothing any more, and forget questions for the time that nobody answered."""
-        now_s = time.monotonic()
+        now_s = machine_s()
         if now_s - self._heard_s > max(SILENT_S, 2 * self.watchdog_s):
             raise lines.Disconnected("the gun says nothing any more")
         self._pending.forget("TIME?", now_s - SILENT_S)

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+from device.machine_clock import machine_s
 from device.serial_gun import lines, reports
 from device.serial_gun.link import PATIENCE_S, Link
 from device.wire.errors import WireError
@@ -92,11 +93,9 @@ class Arming:
 
     def arm(self, disarms: int) -> None:
         """Arm at once, unless it was disarmed since. `LinkError`: it was, or the gun is silent, or has a fault."""
-        latest_s = time.monotonic() + ARM_WITHIN_S
+        latest_s = machine_s() + ARM_WITHIN_S
         try:
-            session = ask_again(
-                self._link, "ARM", lambda: self.disarms == disarms and time.monotonic() <= latest_s
-            ).session
+            session = ask_again(self._link, "ARM", lambda: self.disarms == disarms and machine_s() <= latest_s).session
         except lines.CalledOff as error:
             if self.disarms != disarms:
                 raise
@@ -127,8 +126,8 @@ class Arming:
                 break
             return
         self._link.drop("the gun did not say that it is disarmed")
-        end_s = time.monotonic() + self._link.watchdog_s + MARGIN_S - self._link.silent_for_s
-        while self._link.session == session and time.monotonic() < end_s:
+        end_s = machine_s() + self._link.watchdog_s + MARGIN_S - self._link.silent_for_s
+        while self._link.session == session and machine_s() < end_s:
             time.sleep(0.005)
 
 
@@ -188,14 +187,14 @@ class Triggering:
 
     def _look(self, order: reports.ShotOrder, trouble: LinkError) -> tuple[lines.Reply, ShotRecord] | None:
         """The record of a shot whose answer was lost, when it has ended; None if it was surely not fired."""
-        end_s, stopped = time.monotonic() + self._patience_s(order), False
+        end_s, stopped = machine_s() + self._patience_s(order), False
         while True:
             reply, record = self._last_shot(order, trouble)
             if record.mark != order.mark or record.ending == "NONE":
                 return None
             if record.ending in {"DONE", "CUT"} or stopped:
                 return reply, record
-            if time.monotonic() > end_s:
+            if machine_s() > end_s:
                 self._arming.disarm()
                 stopped = True
 

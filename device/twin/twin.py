@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -11,6 +10,7 @@ from random import Random
 from threading import Event, Thread
 from typing import Self
 
+from device.machine_clock import machine_s
 from device.methods import Method, rendering_of
 from device.twin.core import IDENTITY, Core
 from device.twin.machine import Board, Carried, DriveEvent
@@ -192,7 +192,7 @@ class Twin:
 
     def world_s(self) -> float:
         """The twin's world: monotonic seconds times the speed."""
-        return time.monotonic() * self.make.speed
+        return machine_s() * self.make.speed
 
     def clock_us(self) -> int:
         """The gun's own clock: from its boot on, with its crystal's error."""
@@ -226,7 +226,7 @@ class Twin:
             self._meet_host()
         if data:
             self._post(self._coming, data)
-        now_s = time.monotonic()
+        now_s = machine_s()
         for due_s, act in [plan for plan in self._planned if plan[0] <= now_s]:
             self._planned.remove((due_s, act))
             act()
@@ -252,7 +252,7 @@ class Twin:
         self._socket.unplug()
         self._coming.clear()
         self._going.clear()
-        self._planned.append((time.monotonic() + self.make.troubles.replug_s, self._socket.plug))
+        self._planned.append((machine_s() + self.make.troubles.replug_s, self._socket.plug))
 
     def reset(self) -> None:
         """The firmware boots anew; the magnet flies on."""
@@ -273,7 +273,7 @@ class Twin:
         return Board(late_us=int(1.5 * self._draw.random() * (drive.end_us - drive.time_us)) if late else 0)(drive)
 
     def _wait_s(self) -> float:
-        now_s, wake_us = time.monotonic(), self.core.wake_us()
+        now_s, wake_us = machine_s(), self.core.wake_us()
         times = [plan[0] for plan in self._planned] + [queue[0][0] for queue in (self._coming, self._going) if queue]
         if wake_us is not None:
             times.append(self.world_of(wake_us) / self.make.speed)
@@ -282,7 +282,7 @@ class Twin:
     def _post(self, queue: deque[tuple[float, bytes]], data: bytes) -> None:
         """Put bytes on their way; they stay in order."""
         troubles = self.make.troubles
-        due_s = time.monotonic() + troubles.delay_s(self._draw)
+        due_s = machine_s() + troubles.delay_s(self._draw)
         queue.append((max(due_s, queue[-1][0]) if queue else due_s, troubles.damaged(data, self._draw)))
 
     def _step(self, data: bytes) -> None:
@@ -309,16 +309,16 @@ class Twin:
             self.core.machine.shot = replace(shot, end_us=shot.end_us + BUSY_US)
         elif self._happens(troubles.hang):
             self.accidents.append("hang")
-            self.hangs_until_s = time.monotonic() + troubles.hang_s
+            self.hangs_until_s = machine_s() + troubles.hang_s
 
     def _pull_out(self) -> None:
         """What befalls an answer."""
         if self._happens(self.make.troubles.unplug_reply):
             _, piece = self._going.pop()
             self._socket.write(piece[: len(piece) // 2])
-            self._planned.append((time.monotonic() + 0.001, self.unplug))
+            self._planned.append((machine_s() + 0.001, self.unplug))
         elif self._happens(self.make.troubles.unplug_idle):
-            self._planned.append((time.monotonic() + 0.01, self.unplug))
+            self._planned.append((machine_s() + 0.01, self.unplug))
 
     def _happens(self, rate: float) -> bool:
         return rate > 0 and self._draw.random() < rate

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from device import DeviceError, Gun, open_gun
+from device.machine_clock import MACHINE_CLOCK, machine_s
 from device.methods import Method
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
@@ -83,9 +84,9 @@ def _version(package: str) -> str | None:
 
 def ticks() -> Ticks:
     """The monotonic clock, and how much longer a sleep of 1 ms is."""
-    readings = [time.monotonic() for _ in range(READINGS)]
+    readings = [machine_s() for _ in range(READINGS)]
     return Ticks(
-        resolution_s=time.get_clock_info("monotonic").resolution,
+        resolution_s=time.get_clock_info(MACHINE_CLOCK).resolution,
         smallest_step_s=min(later - sooner for sooner, later in pairwise(readings) if later > sooner),
         oversleep_ms=spread([ms - 1.0 for ms in timed_ms(SLEEPS, lambda: time.sleep(0.001))]),
     )
@@ -93,11 +94,11 @@ def ticks() -> Ticks:
 
 def timed_ms(count: int, act: Callable[[], object]) -> list[float]:
     """How long an act takes each time, in milliseconds; fewer times if it is slow."""
-    times, end_s = list[float](), time.monotonic() + ENOUGH_S
-    while len(times) < count and (not times or time.monotonic() < end_s):
-        start_s = time.monotonic()
+    times, end_s = list[float](), machine_s() + ENOUGH_S
+    while len(times) < count and (not times or machine_s() < end_s):
+        start_s = machine_s()
         act()
-        times.append(1000 * (time.monotonic() - start_s))
+        times.append(1000 * (machine_s() - start_s))
     return times
 
 

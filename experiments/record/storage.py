@@ -17,6 +17,8 @@ from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
 
+from device.machine_clock import machine_s
+
 OWNER_FILE = 0o600
 OWNER_FOLDER = 0o700
 JOURNAL_ENDING = "_journal.jsonl"
@@ -164,9 +166,9 @@ def hold(descriptor: int, patience_s: float = 0.0) -> bool:
 
     With patience, somebody who only looks (`is_held`) and lets go at once is no hindrance.
     """
-    end_s = time.monotonic() + patience_s
+    end_s = machine_s() + patience_s
     while not _locked(descriptor, shared=False):
-        if time.monotonic() >= end_s:
+        if machine_s() >= end_s:
             return False
         time.sleep(_AGAIN_S)
     return True

@@ -11,6 +11,8 @@ from Xlib.display import Display
 from Xlib.error import DisplayError, XError
 from Xlib.ext import xtest
 
+from device.machine_clock import machine_s
+
 LOOK_S = 0.05
 _SMALLEST_PX = 400
 """Qt keeps small windows of its own; what people work at is wider."""
@@ -48,7 +50,7 @@ class Hands:
         return self._key(X.KeyRelease, name)
 
     def _key(self, event: int, name: str) -> float:
-        at_s = time.monotonic()
+        at_s = machine_s()
         xtest.fake_input(self.display, event, self.display.keysym_to_keycode(XK.string_to_keysym(name)))
         self.display.sync()
         return at_s
@@ -89,8 +91,8 @@ class Hands:
         Gives back its place and size in pixels (x, y, width, height) once its middle lies open, as a window manager
         takes its time to raise it and a click meets whatever lies there; `None` if it does not within the time.
         """
-        end_s = time.monotonic() + timeout_s
-        while (found := self._focused(title)) is None and time.monotonic() < end_s:
+        end_s = machine_s() + timeout_s
+        while (found := self._focused(title)) is None and machine_s() < end_s:
             time.sleep(LOOK_S)
         return found
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+from device.machine_clock import machine_s
 from experiments.record import storage
 from experiments.record.journal import Head, JournalError, Record
 from experiments.record.tail import JournalTail
@@ -40,7 +40,7 @@ class MarkerFeed:
 
     def look(self) -> list[Marker]:
         """What is new, in the order of each journal."""
-        if time.monotonic() >= self._next_s:
+        if machine_s() >= self._next_s:
             self.find()
         markers = [marker for run in self._runs.values() for marker in run.look()]
         for path in [path for path, run in self._runs.items() if run.over]:
@@ -50,13 +50,13 @@ class MarkerFeed:
 
     def find(self) -> None:
         """Follow the journals that are new, or have grown."""
-        began_s = time.monotonic()
+        began_s = machine_s()
         for path, stamp in self._journals():
             before = self._known.get(path)
             self._known[path] = stamp
             if path not in self._runs and stamp != before and self._ended.get(path) != stamp[0]:
                 self._follow(path, before, stamp)
-        now_s = time.monotonic()
+        now_s = machine_s()
         self._next_s = now_s + max(_FIND_S, _SHARE * (now_s - began_s))
 
     def _follow(self, path: Path, before: _Stamp | None, now: _Stamp) -> None:
@@ -134,7 +134,7 @@ class FollowedRun:
 
     def _refused(self, first: Record) -> bool:
         """Whether nothing can be told of a sitting, as its clock is not that of this machine; said, if it is so."""
-        now_s, utc = time.monotonic(), datetime.now(UTC)
+        now_s, utc = machine_s(), datetime.now(UTC)
         clock = self._clock or "real"
         if clock != "real":
             why = f"this run is on a clock of its own ({clock}), which no other recording has"

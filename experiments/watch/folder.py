@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import stat
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from device.machine_clock import machine_s
 from experiments.record.journal import ENDING
 from experiments.study.folders import PlaceError
 from experiments.watch.runs import RunRow, WatchedRun
@@ -61,7 +61,7 @@ class FolderWatch:
 
     def look(self) -> Watched | None:
         """What there is to show; `None` if that is the same as before."""
-        now_s = time.monotonic()
+        now_s = machine_s()
         changed = self._find()
         for run in tuple(self._runs.values()):
             changed |= run.look()
@@ -118,7 +118,7 @@ class FolderWatch:
             run = self._runs[path] = WatchedRun(path)
             del self._unread[path]
             run.look()
-            if time.monotonic() > until_s:
+            if machine_s() > until_s:
                 break
         return bool(waiting)
 
@@ -234,16 +234,16 @@ class Reader:
             return self._number, self._parts
 
     def _look_on(self) -> None:
-        began_s = time.monotonic()
+        began_s = machine_s()
         took_s = 0.0
         while not self._leaves.wait(max(NEXT_LOOK_S, SHARE * took_s)):
-            began_s = time.monotonic()
+            began_s = machine_s()
             try:
                 self._look()
             except Exception as error:  # noqa: BLE001 - raised where the page is served
                 self.failure = error
                 self._leaves.set()
-            took_s = time.monotonic() - began_s
+            took_s = machine_s() - began_s
 
     def _look(self) -> None:
         seen = self._watch.look()

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from device.machine_clock import machine_s
 from device.words import RecoilError, error_line, said_by
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.watch.feed import MarkerFeed
@@ -128,7 +129,7 @@ class MarkerOutlets:
             self._outlets.clear()
 
     def _clock_now(self) -> ClockMap:
-        now_s = time.monotonic()
+        now_s = machine_s()
         if now_s >= self._next_s:
             before, new = self._clock, self._mapped()
             self._clock = replace(new, uncertainty_s=new.uncertainty_s + abs(new.offset_s - before.offset_s))
@@ -137,7 +138,7 @@ class MarkerOutlets:
 
     def _mapped(self) -> ClockMap:
         """The clock of the streams beside that of the journals, which are the same on some systems."""
-        read, there = time.monotonic, self._lsl.local_clock
+        read, there = machine_s, self._lsl.local_clock
         found = clock_map(RoundTrip(sent_s=read(), there_s=there(), back_s=read()) for _ in range(_READINGS))
         if not math.isfinite(found.offset_s):
             raise ValueError(f"its clock gives {there()!r}")

@@ -7,6 +7,7 @@ import time
 from PyQt6.QtCore import QCoreApplication, QEventLoop
 from PyQt6.QtWidgets import QApplication, QLabel, QWidget
 
+from device.machine_clock import machine_s
 from experiments.doctor.figures import Display
 from experiments.doctor.programs import Absent
 
@@ -24,8 +25,8 @@ def label(text: str) -> QLabel:
 def until_seen(window: QWidget) -> bool:
     """Show a window and wait until the display has it; false if it never has."""
     window.show()
-    end_s = time.monotonic() + SEEN_WITHIN_S
-    while time.monotonic() < end_s:
+    end_s = machine_s() + SEEN_WITHIN_S
+    while machine_s() < end_s:
         QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 10)
         handle = window.windowHandle()
         if handle is not None and handle.isExposed():
@@ -40,12 +41,12 @@ def look() -> Display:
     screen = app.primaryScreen()
     if screen is None:
         raise Absent("the desktop has no screen")
-    start_s = time.monotonic()
+    start_s = machine_s()
     seen = until_seen(label("Recoil looks at the display."))
     return Display(
         platform=app.platformName(),
         width_px=screen.size().width(),
         height_px=screen.size().height(),
         refresh_Hz=screen.refreshRate(),
-        opened_ms=1000 * (time.monotonic() - start_s) if seen else None,
+        opened_ms=1000 * (machine_s() - start_s) if seen else None,
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
-
 from PyQt6.QtCore import QCoreApplication, QEventLoop, QTimer
 from PyQt6.QtGui import QKeyEvent
 from PyQt6.QtWidgets import QApplication, QLabel
 from Xlib import XK, X, display  # type: ignore[import-untyped, unused-ignore]
 from Xlib.ext import xtest  # type: ignore[import-untyped, unused-ignore]
 
+from device.machine_clock import machine_s
 from experiments.doctor.figures import Keys
 from experiments.doctor.programs import Absent
 from experiments.doctor.programs.display import until_seen
@@ -37,10 +36,10 @@ class Target(QLabel):
 
     def keyPressEvent(self, _: QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
         """Stamp, paint as the console does after an answer, stamp again."""
-        came_s = time.monotonic()
+        came_s = machine_s()
         self.setText(f"Recoil times keys: {came_s:.6f} s")
         self.repaint()
-        self.stamps = came_s, time.monotonic()
+        self.stamps = came_s, machine_s()
         self._loop.quit()
 
 
@@ -60,7 +59,7 @@ class Injector:
 
     def press(self) -> float:
         """Press and let go of the key F; gives back when."""
-        start_s = time.monotonic()
+        start_s = machine_s()
         for event in (X.KeyPress, X.KeyRelease):
             xtest.fake_input(self._display, event, self._code)
         self._display.flush()

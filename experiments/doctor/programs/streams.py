@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from uuid import uuid4
 
+from device.machine_clock import machine_s
 from experiments.doctor.figures import MarkerStream
 from experiments.doctor.programs import Absent
 
@@ -30,9 +30,9 @@ def look() -> MarkerStream:
     inlet.open_stream(_SECONDS)
     took_ms = list[float]()
     for number in range(_MARKERS):
-        sent_s = time.monotonic()
+        sent_s = machine_s()
         outlet.push_sample([str(number)], pylsl.local_clock())
         if inlet.pull_sample(_SECONDS)[0] != [str(number)]:
             break
-        took_ms.append(1000 * (time.monotonic() - sent_s))
+        took_ms.append(1000 * (machine_s() - sent_s))
     return MarkerStream(version=version, sent=_MARKERS, to_reader_ms=took_ms)

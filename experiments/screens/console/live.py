@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, ExitStack
@@ -16,6 +15,7 @@ from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtGui import QGuiApplication
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
+from device.machine_clock import machine_s
 from device.words import RecoilError
 from experiments.catalogues.catalogue import Language
 from experiments.clock import RealClock
@@ -258,7 +258,7 @@ def ask_about(request: RunRequest, found: UnfinishedRun) -> RunRequest | None:
     `KeyboardInterrupt` if a signal ended the question.
     """
     dialog = Unfinished(request, found)
-    FreshShortcuts(dialog, time.monotonic)
+    FreshShortcuts(dialog, machine_s)
     with signals_to(lambda _: dialog.reject()) as signalled:
         dialog.exec()
     decided = dialog.decided

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Self
 
@@ -10,6 +9,7 @@ from PyQt6.QtCore import Qt, QTimer
 from PyQt6.QtGui import QWindow
 from PyQt6.QtTest import QTest
 
+from device.machine_clock import machine_s
 from experiments.design.plan import Condition
 from experiments.screens.console.app import Console
 from experiments.screens.console.window import ConsoleWindow
@@ -172,9 +172,9 @@ class Rater:
 
     def _place(self) -> tuple[int, int, int, int] | None:
         """Where the participant's window lies, now that it has the keys; `None` if there is none, or it is too soon."""
-        if time.monotonic() - self._at_s < RATE_AGAIN_S:
+        if machine_s() - self._at_s < RATE_AGAIN_S:
             return None
-        self._at_s = time.monotonic()
+        self._at_s = machine_s()
         return self._hands.focus_on(WINDOW_TITLE)
 
     def _confirm(self) -> None:

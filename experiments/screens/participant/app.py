@@ -14,6 +14,7 @@ from typing import BinaryIO
 
 from pydantic import ValidationError
 
+from device.machine_clock import machine_s
 from experiments.screens.participant import messages
 from experiments.screens.participant.messages import line
 from experiments.screens.participant.noise import MaskingNoise
@@ -76,7 +77,7 @@ _LISTEN_S = 1.0
 
 def run_program(look: messages.Look, heard: BinaryIO, said: BinaryIO) -> int:
     """Run the program; whatever ends it but the console is said as `ScreenFailed`. Gives back the exit code."""
-    wire = Wire(heard, said, time.monotonic)
+    wire = Wire(heard, said, machine_s)
     try:
         toolkit = load_toolkit()
         wire = Wire(heard, said, toolkit.now)

@@ -1,0 +1,44 @@
+"""What becomes of us on Windows and on a Mac, as far as it can be seen on Linux: with what they lack taken away."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def elsewhere(system: str, *words: str, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """A command as another system would carry it out."""
+    return subprocess.run(
+        [sys.executable, "-m", "tests.elsewhere", system, *words],
+        cwd=folder,
+        env={"PATH": "", "PYTHONPATH": str(ROOT), "HOME": str(folder), "PYTHONIOENCODING": "cp1252"},
+        capture_output=True,
+        encoding="cp1252",
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("system", ["win32", "darwin"])
+def test_every_module_can_be_imported(system: str) -> None:
+    done = elsewhere(system, "import")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+# the clock
+
+
+def test_windows_has_the_fine_clock() -> None:
+    look = "import sys, time; sys.platform = 'win32'; from device import machine_clock as ours; "
+    look += "sys.exit(ours.machine_s is not time.perf_counter or ours.MACHINE_CLOCK != 'perf_counter')"
+    assert subprocess.run([sys.executable, "-c", look], cwd=ROOT, check=False).returncode == 0
+
+
+def test_nobody_tells_the_time_by_another_clock() -> None:
+    files = [path for top in ("device", "experiments", "analysis", "recoil") for path in (ROOT / top).rglob("*.py")]
+    strangers = [path.name for path in files if "time.monotonic" in path.read_text(encoding="utf-8")]
+    assert strangers == ["machine_clock.py"]
