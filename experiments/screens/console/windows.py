@@ -210,6 +210,8 @@ _PLACES = {
     for place, letter in enumerate(row)
 }
 """Letters by X's number of their place on the keyboard, for alphabets that have others there."""
+_BELOW_X = 8
+"""So much less than X's are Windows' numbers; a Mac's Qt gives each key the number 1, which is no place."""
 _DIGITS = {10 + place: digit for place, digit in enumerate("1234567890")}
 """As the letters, for keyboards that have digits with Shift alone."""
 
@@ -342,7 +344,8 @@ def key_name(event: QKeyEvent) -> str:
         return named
     if key < _ASCII_END and chr(key).isalnum():  # Qt's numbers of letters and digits are those of ASCII
         return chr(key)
-    place, is_letter = event.nativeScanCode(), event.text().isalpha() and not event.text().isascii()
+    place = event.nativeScanCode() + (_BELOW_X if sys.platform == "win32" else 0)
+    is_letter = event.text().isalpha() and not event.text().isascii()
     return _DIGITS.get(place) or (_PLACES.get(place) if is_letter else None) or f"#{key}"
 
 
