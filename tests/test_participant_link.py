@@ -157,6 +157,11 @@ def test_a_screen_that_dies_tells_its_last_words(child):
         link.ask_rating(SCALE, PATIENCE_S)
 
 
+def test_a_screen_that_dies_tells_its_last_words_on_windows_too(child, monkeypatch):
+    monkeypatch.delattr(os, "pread")  # without which nobody would hear that the screen is gone
+    test_a_screen_that_dies_tells_its_last_words(child)
+
+
 @contextmanager
 def while_asking(link, act):
     """Has something done by another thread once the question is open."""

@@ -344,7 +344,7 @@ class ParticipantProcess:
         """The end of what the child wrote as errors; its file position is the child's too, so it stays where it is."""
         errors = self._errors.fileno()
         start = max(0, os.fstat(errors).st_size - _LAST_BYTES)
-        lines = os.pread(errors, _LAST_BYTES, start).decode(errors="replace").strip().splitlines()
+        lines = _read_at(errors, start).decode(errors="replace").strip().splitlines()
         return f"; its last words: {lines[-1].strip()}" if lines else ""
 
     def _read(self, pipe: IO[bytes]) -> None:
@@ -358,6 +358,18 @@ class ParticipantProcess:
             while (line := self._out.get()) is not None:
                 pipe.write(line)
                 pipe.flush()
+
+
+def _read_at(descriptor: int, start: int) -> bytes:
+    """The last bytes from there on, with the position left as it stands."""
+    if hasattr(os, "pread"):
+        return os.pread(descriptor, _LAST_BYTES, start)
+    position = os.lseek(descriptor, 0, os.SEEK_CUR)  # Windows: it is moved and put back, as nobody writes any more
+    os.lseek(descriptor, start, os.SEEK_SET)
+    try:
+        return os.read(descriptor, _LAST_BYTES)
+    finally:
+        os.lseek(descriptor, position, os.SEEK_SET)
 
 
 def _ending(code: int | None) -> str:
