@@ -142,8 +142,9 @@ class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
 
 
-INTERRUPTS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-"""The signals that end a command in order; not every system knows all three."""
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last: Ctrl+Break, or a terminal that is closed, on Windows
+INTERRUPTS = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
+"""The signals that end a command in order; no system knows all of them."""
 AWAKE_S = 0.2
 """Who may wait long looks up so often. On Linux a thread that is being started may take a signal that was meant for the
 main thread, which then sleeps on: Ctrl+C would do nothing until it wakes.

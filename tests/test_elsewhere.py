@@ -42,3 +42,33 @@ def test_nobody_tells_the_time_by_another_clock() -> None:
     files = [path for top in ("device", "experiments", "analysis", "recoil") for path in (ROOT / top).rglob("*.py")]
     strangers = [path.name for path in files if "time.monotonic" in path.read_text(encoding="utf-8")]
     assert strangers == ["machine_clock.py"]
+
+
+# signals
+
+
+def test_ctrl_break_and_a_closed_terminal_end_a_command_in_order() -> None:
+    look = "import signal, sys; signal.SIGBREAK = signal.SIGUSR1; del signal.SIGHUP; "
+    look += "from device.words import INTERRUPTS as ours; sys.exit([*map(int, ours)] != [2, 15, signal.SIGBREAK])"
+    assert subprocess.run([sys.executable, "-c", look], cwd=ROOT, check=False).returncode == 0
+
+
+def test_ctrl_c_is_for_the_run_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    from device.sensor import link
+    from experiments.watch import markers_process
+
+    started: list[dict[str, object]] = []
+
+    def begin(_: object, **how: object) -> None:
+        started.append(how)
+        raise FileNotFoundError
+
+    monkeypatch.setattr(subprocess, "Popen", begin)
+    monkeypatch.setattr(link, "OWN_GROUP", 0x200)
+    with pytest.raises(FileNotFoundError):
+        link.SensorLink("simulated")
+    monkeypatch.setattr(markers_process, "OWN_GROUP", 0x200)
+    said: list[str] = []
+    with markers_process.markers_beside(ROOT, said.append):
+        assert len(said) == 1
+    assert [how["creationflags"] for how in started] == [0x200, 0x200]

@@ -210,6 +210,10 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
         raise PluginError(f"gun plug-in {name}: its import {ended}: {said.rpartition(chr(10))[2] or 'it said nothing'}")
 
 
+OWN_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+"""How a program is started on Windows that Ctrl+C is not for; elsewhere `start_new_session` keeps it away."""
+
+
 def own_program(module: str, word: str) -> tuple[list[str], dict[str, str]]:
     """The command and the environment of `python -m MODULE WORD`, which finds the packages that this process finds."""
     paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from device.machine_clock import machine_s
 from device.methods import Method
-from device.plugin.door import own_program
+from device.plugin.door import OWN_GROUP, own_program
 from device.sensor.process import UNHEARD_S, SensorReady, ShotAsked, ShotReply
 from device.sensor.streams import SensorError
 
@@ -89,6 +89,7 @@ class SensorLink:
             stderr=subprocess.DEVNULL,
             env=environment,
             start_new_session=True,  # Ctrl-C is for the run, which closes it
+            creationflags=OWN_GROUP,
         )
         self._said: queue.Queue[SensorSaid] = queue.Queue()
         self._count = 0

@@ -15,6 +15,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import IO
 
+from device.plugin.door import OWN_GROUP
 from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
 
 READY_S, _SOON_S = 20.0, 5.0
@@ -40,6 +41,7 @@ def markers_beside(results: Path, say: _Tell) -> Iterator[None]:
             encoding="utf-8",
             cwd=_ROOT,
             start_new_session=True,  # Ctrl+C is for the run
+            creationflags=OWN_GROUP,
         )
     except OSError as error:
         say(f"no markers: {error}")

@@ -27,6 +27,7 @@ from PyQt6 import QtCore
 from PyQt6.QtGui import QKeyEvent
 from PyQt6.QtWidgets import QApplication, QWidget
 
+from device.words import INTERRUPTS
 from experiments.screens.console.keys import EventClock, Name, Presses
 
 DESIGNED_FOR_PX = (1280, 800)
@@ -123,17 +124,16 @@ WAKE_MS = 100
 
 @contextmanager
 def signals_to(leave: Callable[[str], None] | None = None) -> Iterator[list[str]]:
-    """Have SIGINT, SIGTERM and SIGHUP call `leave` with the signal's name; gives the names of those that came.
+    """Have the signals of `INTERRUPTS` call `leave` with the signal's name; gives the names of those that came.
 
     `leave` is called by Qt's event loop, never in the midst of what was going on, such as painting. Without `leave`,
     where there is no window, a signal raises `KeyboardInterrupt`. Where one such context lies in another, the inner one
     takes a signal and the outer one notes it: what ends a run also ends the day around it.
     """
-    known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    handler = _Handler(leave, {number: signal.getsignal(number) for number in known}, [])
+    handler = _Handler(leave, {number: signal.getsignal(number) for number in INTERRUPTS}, [])
     _wake()
     try:
-        for number in known:
+        for number in INTERRUPTS:
             signal.signal(number, handler)
         yield handler.came
     finally:
