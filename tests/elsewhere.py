@@ -36,7 +36,7 @@ class _Hidden:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
-def _byte_locks() -> ModuleType:
+def byte_locks() -> ModuleType:
     """Windows' locks of bytes, by those of Unix."""
     import fcntl
 
@@ -54,7 +54,7 @@ def be(system: str) -> None:
     for name in LIBRARIES:
         importlib.import_module(name)
     if system == "win32":
-        sys.modules["msvcrt"] = _byte_locks()
+        sys.modules["msvcrt"] = byte_locks()
         for name in OF_UNIX:
             sys.modules.pop(name, None)
         sys.meta_path.insert(0, _Hidden())  # type: ignore[arg-type] # it finds nothing

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from experiments.record import storage
 
 ROOT = Path(__file__).parents[1]
 
@@ -72,3 +76,26 @@ def test_ctrl_c_is_for_the_run_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     with markers_process.markers_beside(ROOT, said.append):
         assert len(said) == 1
     assert [how["creationflags"] for how in started] == [0x200, 0x200]
+
+
+# files
+
+
+def test_a_drive_that_a_mac_cannot_ask_is_synced_as_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import fcntl
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOTSUP, "Operation not supported")  # as of a folder that is shared by SMB
+
+    synced: list[int] = []
+    monkeypatch.setattr(fcntl, "F_FULLFSYNC", 51, raising=False)
+    monkeypatch.setattr(fcntl, "fcntl", refuse)
+    monkeypatch.setattr(os, "fsync", synced.append)
+    monkeypatch.setattr("sys.platform", "darwin")
+    descriptor = os.open(tmp_path / "file", os.O_CREAT | os.O_WRONLY)
+    storage.sync(descriptor)
+    assert synced == [descriptor]
+    monkeypatch.setattr(fcntl, "fcntl", lambda *_: 0)
+    storage.sync(descriptor)
+    assert synced == [descriptor]
+    os.close(descriptor)

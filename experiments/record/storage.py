@@ -1,7 +1,7 @@
 """Files that are safe once written: readable by their owner only, synced with their folder, held by one run at a time.
 
-Linux is tested. On macOS a sync asks the drive itself (`F_FULLFSYNC`); on Windows folders cannot be synced and file
-modes do not exist, so the folder's own permissions count there.
+Linux is tested. On macOS a sync asks the drive itself (`F_FULLFSYNC`), where the file system can. On Windows folders
+cannot be synced and file modes do not exist, so the folder's own permissions count there.
 """
 
 from __future__ import annotations
@@ -145,9 +145,10 @@ def sync(descriptor: int) -> None:
     if sys.platform == "darwin":
         import fcntl  # noqa: PLC0415 - this system only
 
-        fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
-    else:
-        os.fsync(descriptor)
+        with suppress(OSError):  # a shared folder or a foreign disk has no such request: then as elsewhere
+            fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
+            return
+    os.fsync(descriptor)
 
 
 def sync_folder(folder: Path) -> None:
