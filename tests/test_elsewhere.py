@@ -7,10 +7,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from analysis.report import placing
 from experiments.record import storage
+from tests.elsewhere import byte_locks
 
 ROOT = Path(__file__).parents[1]
 
@@ -99,3 +102,48 @@ def test_a_drive_that_a_mac_cannot_ask_is_synced_as_elsewhere(tmp_path: Path, mo
     storage.sync(descriptor)
     assert synced == [descriptor]
     os.close(descriptor)
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its locks, which know no sharing and hold no folder."""
+
+    def open_file(path: Path, *how: int) -> int:
+        if Path(path).is_dir():
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return os.open(path, *how)
+
+    monkeypatch.setattr(storage, "os", SimpleNamespace(**vars(os) | {"name": "nt", "open": open_file}))
+    monkeypatch.setitem(sys.modules, "msvcrt", byte_locks())
+    monkeypatch.setattr("sys.platform", "win32")
+
+
+def test_a_folder_is_held_by_a_file_beside_it_that_goes_again(windows: None, tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    folder.mkdir()
+    with storage.folder_held(folder) as ours:
+        with storage.folder_held(folder) as theirs:
+            assert (ours, theirs) == (True, False)
+        folder.rename(tmp_path / "elsewhere")  # nothing in it is open
+    with storage.folder_held(folder) as again:
+        assert again
+    assert [path.name for path in tmp_path.iterdir()] == ["elsewhere"]
+
+
+def test_the_unfinished_folder_of_another_that_is_at_work_is_kept(windows: None, tmp_path: Path) -> None:
+    with placing.files_in(tmp_path) as part, placing.files_in(tmp_path) as another:
+        assert part.is_dir()
+        (part / "ours").touch()
+        (another / "theirs").touch()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ours", "theirs"]
+
+
+def test_who_looks_at_the_same_time_as_another_takes_them_for_nobody_who_holds(
+    windows: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    looking = storage.reopen(tmp_path / "file")
+    assert storage.hold(looking)
+    assert storage.is_held(tmp_path / "file")
+    monkeypatch.setattr(storage.time, "sleep", lambda _: os.close(looking))  # who looks is done soon
+    assert not storage.is_held(tmp_path / "file")

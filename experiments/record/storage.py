@@ -180,25 +180,46 @@ _AGAIN_S = 0.01
 
 @contextmanager
 def folder_held(folder: Path, patience_s: float = 0.0) -> Iterator[bool]:
-    """Hold a folder for this process, and say whether nobody else does. Where folders cannot be held, nobody does."""
+    """Hold a folder for this process, and say whether nobody else does. Where folders cannot be held, nobody does.
+
+    Windows opens no folder: a file beside it is held in its stead, which is gone in the end.
+    """
+    beside = _beside(folder) if sys.platform == "win32" else None
     try:
-        descriptor = os.open(folder, os.O_RDONLY)
+        descriptor = os.open(beside or folder, os.O_RDWR | os.O_CREAT if beside else os.O_RDONLY, OWNER_FILE)
     except OSError:
-        yield os.name != "posix"
+        yield beside is not None
         return
+    is_ours = False
     try:
-        yield hold(descriptor, patience_s)
+        is_ours = hold(descriptor, patience_s)
+        yield is_ours
     finally:
         os.close(descriptor)
+        if beside is not None and is_ours:
+            with suppress(OSError):  # another one waits for it
+                beside.unlink()
+
+
+def _beside(folder: Path) -> Path:
+    """The file that stands for a folder; one in it would keep the folder from being renamed."""
+    here = folder.absolute()
+    return here.parent / f".{here.name}.held"
 
 
 def is_held(path: Path) -> bool:
-    """Whether somebody holds a file. To find out it is held for a moment, which others who only look do not notice."""
+    """Whether somebody holds a file. To find out it is held for a moment, which others who only look do not notice.
+
+    On Windows they would: whoever looks there looks again for a moment before it is said to be held.
+    """
     descriptor = open_to_read(path)
     try:
-        return not _locked(descriptor, shared=True)
+        return not (hold(descriptor, _LOOKED_S) if sys.platform == "win32" else _locked(descriptor, shared=True))
     finally:
         os.close(descriptor)
+
+
+_LOOKED_S = 0.05
 
 
 def _locked(descriptor: int, *, shared: bool) -> bool:
