@@ -147,3 +147,48 @@ def test_who_looks_at_the_same_time_as_another_takes_them_for_nobody_who_holds(
     assert storage.is_held(tmp_path / "file")
     monkeypatch.setattr(storage.time, "sleep", lambda _: os.close(looking))  # who looks is done soon
     assert not storage.is_held(tmp_path / "file")
+
+
+@pytest.fixture
+def excel(windows: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A table that another program has open."""
+    table, renamed = tmp_path / "b.csv", Path.rename
+
+    def rename(path: Path, target: Path) -> Path:
+        if table in (path, target):
+            raise PermissionError(errno.EACCES, "Access is denied", str(path))
+        return renamed(path, target)
+
+    table.write_bytes(b"old")
+    monkeypatch.setattr(Path, "rename", rename)
+    monkeypatch.setattr(Path, "replace", rename)
+    return table
+
+
+def test_a_table_that_is_open_elsewhere_is_named_with_what_to_do(excel: Path) -> None:
+    with pytest.raises(PermissionError) as refused:
+        storage.write_whole(excel, b"new")
+    assert (refused.value.filename, refused.value.strerror) == (
+        str(excel),
+        "cannot be replaced: if another program has it open, such as Excel, close it there",
+    )
+    assert [path.name for path in excel.parent.iterdir()] == ["b.csv"]
+
+
+def test_of_results_of_which_one_is_open_elsewhere_none_is_replaced(excel: Path) -> None:
+    (excel.parent / "a.csv").write_bytes(b"old")
+
+    def write() -> None:
+        with placing.files_in(excel.parent) as part:
+            for name in ("a.csv", "b.csv"):
+                (part / name).write_bytes(b"new")
+
+    with pytest.raises(PermissionError, match=r"close it there"):
+        write()
+    assert {path.name: path.read_bytes() for path in excel.parent.iterdir()} == {"a.csv": b"old", "b.csv": b"old"}
+
+
+def test_who_only_looks_is_waited_for(excel: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(storage.time, "sleep", lambda _: monkeypatch.undo())
+    storage.write_whole(excel, b"new")
+    assert excel.read_bytes() == b"new"

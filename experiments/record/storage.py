@@ -249,11 +249,35 @@ def errors_name(path: Path | str) -> Iterator[None]:
 
 
 def check_file(path: Path) -> None:
-    """`OSError` if something is at this place that is no file: a folder, a device, or a pipe, which may never end."""
+    """`OSError` if something is at this place that is no file: a folder, a device, or a pipe, which may never end.
+
+    Or a file that is open in another program, on Windows.
+    """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder, not a file", str(path))
     if path.exists() and not path.is_file():
         raise OSError(errno.EINVAL, "is a device or a pipe, not a file", str(path))
+    if sys.platform == "win32" and path.exists():
+        _check_closed(path)
+
+
+def _check_closed(path: Path) -> None:
+    """`PermissionError` if a file stays open elsewhere: Windows then lets nothing rename it, or take its place."""
+    end_s = machine_s() + _OPEN_S
+    while True:
+        try:
+            path.rename(path)
+        except PermissionError:
+            if machine_s() >= end_s:
+                raise PermissionError(errno.EACCES, _IS_OPEN, str(path)) from None
+            time.sleep(_AGAIN_S)
+        else:
+            return
+
+
+_OPEN_S = 1.0
+"""Who only looks has a file open for less (assumed)."""
+_IS_OPEN = "cannot be replaced: if another program has it open, such as Excel, close it there"
 
 
 def write_whole(path: Path, data: bytes) -> None:
