@@ -10,8 +10,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import serial
 
 from analysis.report import placing
+from device.serial_gun.lines import SerialPort
+from device.words import LinkError
 from experiments.record import storage
 from tests.elsewhere import byte_locks
 
@@ -192,3 +195,24 @@ def test_who_only_looks_is_waited_for(excel: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(storage.time, "sleep", lambda _: monkeypatch.undo())
     storage.write_whole(excel, b"new")
     assert excel.read_bytes() == b"new"
+
+
+# ports
+
+
+@pytest.mark.parametrize(
+    ("said", "reason"),
+    [
+        ("PermissionError(13, 'Zugriff verweigert', None, 5)", "another program, or another run, has it open"),
+        ("FileNotFoundError(2, 'Das System kann ...', None, 2)", "No such file or directory"),
+    ],
+)
+def test_a_port_that_is_taken_or_not_there_is_told_as_elsewhere(
+    said: str, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise serial.SerialException(f"could not open port 'COM3': {said}")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(LinkError, match=rf"^cannot open COM3: {reason}"):
+        SerialPort("COM3")

@@ -327,8 +327,13 @@ IN_USE = "another program, or another run, has it open: close that first"
 
 
 def _reason(error: Exception) -> str:
-    """What went wrong, in the system's words: pyserial's own repeat address and number."""
-    number = getattr(error, "errno", None)
-    if number == errno.EAGAIN:
+    """What went wrong, in the system's words: pyserial's own repeat address and number.
+
+    Of Windows' errors it keeps the name alone. There a port is one program's at a time.
+    """
+    number, said = getattr(error, "errno", None), str(error)
+    if number == errno.EAGAIN or "PermissionError(" in said:
         return IN_USE
-    return os.strerror(number) if isinstance(number, int) else str(error)
+    if "FileNotFoundError(" in said:
+        return os.strerror(errno.ENOENT)
+    return os.strerror(number) if isinstance(number, int) else said
