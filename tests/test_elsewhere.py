@@ -13,6 +13,7 @@ import pytest
 import serial
 
 from analysis.report import placing
+from device.sensor.streams import CsvSensor, SensorError
 from device.serial_gun.lines import SerialPort
 from device.words import LinkError
 from experiments.record import storage
@@ -216,3 +217,20 @@ def test_a_port_that_is_taken_or_not_there_is_told_as_elsewhere(
     monkeypatch.setattr(serial, "serial_for_url", refuse)
     with pytest.raises(LinkError, match=rf"^cannot open COM3: {reason}"):
         SerialPort("COM3")
+
+
+@pytest.mark.parametrize("port", ["COM3", "com12", "COM3:", r"\\.\COM10"])
+def test_a_serial_port_is_no_file_on_windows(port: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "win32")
+    with pytest.raises(SensorError, match=r"^is a serial port, which Windows does not read as a file"):
+        CsvSensor(port)
+
+
+def test_a_file_that_grows_is_read_where_nothing_is_opened_without_waiting(tmp_path: Path) -> None:
+    (tmp_path / "lines.csv").touch()
+    look = "import os; del os.O_NONBLOCK; from device.sensor.streams import CsvSensor; "
+    look += "sensor = CsvSensor('lines.csv'); open('lines.csv', 'a').write('1.5,0.25\\n'); print(sensor.read())"
+    done = subprocess.run(
+        [sys.executable, "-c", look], cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, capture_output=True, check=False
+    )
+    assert (done.stdout, done.stderr) == (b"[(1.5, 0.25)]\n", b"")

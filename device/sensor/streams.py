@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
+import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -116,8 +118,10 @@ class CsvSensor:
     def __init__(self, path: str) -> None:
         if not path:
             raise SensorError("names no file; give one, as in csv:/dev/ttyACM0")
+        if sys.platform == "win32" and _PORT.fullmatch(path):
+            raise SensorError(_NO_FILE_THERE)
         try:
-            self._descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_NOCTTY", 0))
+            self._descriptor = os.open(path, _READ_AT_ONCE)
         except OSError as error:
             raise SensorError(f"cannot be opened ({error.strerror})") from error
         if stat.S_ISDIR(os.fstat(self._descriptor).st_mode):
@@ -162,6 +166,14 @@ class CsvSensor:
         os.close(self._descriptor)
 
 
+_READ_AT_ONCE = os.O_RDONLY
+for _flag in ("O_NONBLOCK", "O_NOCTTY", "O_BINARY"):  # no system knows all of them
+    _READ_AT_ONCE |= getattr(os, _flag, 0)
+_PORT = re.compile(r"(\\\\\.\\)?COM\d+:?", re.IGNORECASE)
+_NO_FILE_THERE = (
+    "is a serial port, which Windows does not read as a file; have a program write its lines to a file that grows, or "
+    "use a plug-in"
+)
 _LINE_RULE = (
     "a line is `time_s,acceleration_m_s2`, two numbers with decimal points and a comma between them, and ends with LF"
 )
