@@ -12,6 +12,7 @@ import logging
 import os
 import re
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -56,8 +57,12 @@ def on_cluster(address: str) -> Iterator[RunPieces]:
         yield partial(_on_cluster, client)
 
 
+_MOST_ON_WINDOWS = 61
+"""A pool of more processes is refused there."""
+
+
 def _on_processes(workers: int, function: Function, pieces: Sequence[Any], done: Done) -> None:
-    workers = min(workers, len(pieces))
+    workers = min(workers, len(pieces), _MOST_ON_WINDOWS if sys.platform == "win32" else workers)
     if workers < 2:
         for number, piece in enumerate(pieces):
             done(number, function(piece))
