@@ -138,9 +138,9 @@ def send_beside() -> int:
     def tell(made: MarkerStreams) -> None:
         print(f"{_PROBLEM}{made.problem}" if made.problem else _READY, flush=True)  # noqa: T201 - to the run
 
-    for stream in (sys.stdout, sys.stderr):
+    for stream, encoding in ((sys.stdout, "utf-8"), (sys.stderr, None)):  # the run reads the first, people the second
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files may be no text
+            stream.reconfigure(encoding=encoding, errors="backslashreplace")  # names of files may be no text
 
     def say(text: str) -> None:
         with suppress(OSError):  # where the terminal is gone, nobody reads it
