@@ -12,6 +12,7 @@ two-button box that acts as keys needs none; and so the console must not use the
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -336,8 +337,11 @@ class Toolkit:
 
 @contextmanager
 def writable_home() -> Iterator[None]:
-    """A home folder for PsychoPy, which writes to it when it is imported: another if this one takes nothing."""
-    if _takes_files(Path(os.environ.get("HOME", "")) / ".psychopy3"):
+    """A home folder for PsychoPy, which writes to it when it is imported: another if this one takes nothing.
+
+    On Windows it does not ask for `HOME`.
+    """
+    if sys.platform == "win32" or _takes_files(Path(os.environ.get("HOME", "")) / ".psychopy3"):
         yield
         return
     with tempfile.TemporaryDirectory(prefix="recoil-home-", ignore_cleanup_errors=True) as home:
