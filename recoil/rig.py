@@ -53,7 +53,7 @@ def serve(asked: TwinRequest, tell: Callable[[Plugged], None]) -> None:
     twin = Twin(socket, methods, _make(asked))
     try:
         socket.plug()
-    except (OSError, ImportError, AttributeError) as error:  # the latter two: a system without pseudo-terminals
+    except OSError as error:
         raise PlaceError(f"the twin cannot be plugged in here: {error}; try --tcp PORT, or another --link") from error
     try:
         tell(Plugged(address=socket.address, gun=_gun_option(socket.address, asked.speed)))

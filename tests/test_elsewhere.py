@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,11 +13,13 @@ from types import SimpleNamespace
 import pytest
 import serial
 
+from analysis.predict import jobs
 from analysis.report import placing
 from device.sensor.streams import CsvSensor, SensorError
 from device.serial_gun.lines import SerialPort
 from device.words import LinkError
 from experiments.record import storage
+from experiments.screens.participant.stage import writable_home
 from tests.elsewhere import byte_locks
 
 ROOT = Path(__file__).parents[1]
@@ -234,3 +237,72 @@ def test_a_file_that_grows_is_read_where_nothing_is_opened_without_waiting(tmp_p
         [sys.executable, "-c", look], cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, capture_output=True, check=False
     )
     assert (done.stdout, done.stderr) == (b"[(1.5, 0.25)]\n", b"")
+
+
+# processes
+
+
+def test_no_more_workers_are_asked_for_than_windows_allows(monkeypatch: pytest.MonkeyPatch) -> None:
+    def pool(workers: int, **_: object) -> None:
+        raise RuntimeError(workers)
+
+    monkeypatch.setattr(jobs, "ProcessPoolExecutor", pool)
+    for system, most in (("win32", "61"), ("linux", "96")):
+        monkeypatch.setattr("sys.platform", system)
+        with jobs.on_processes(96) as run, pytest.raises(RuntimeError, match=rf"^{most}$"):
+            run(abs, range(200), lambda *_: None)
+
+
+def test_what_the_markers_say_to_the_run_is_utf_8_whatever_the_terminal_takes(tmp_path: Path) -> None:
+    (tmp_path / "pylsl.py").write_text("raise ImportError('l’été')", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments.watch.markers_process", str(tmp_path)],
+        env={"PYTHONPATH": f"{tmp_path}:{ROOT}", "PYTHONIOENCODING": "cp1252"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        check=False,
+    )
+    assert "l’été" in done.stdout.decode("utf-8")
+
+
+def test_the_participants_screen_leaves_nothing_where_it_was_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("HOME")
+    monkeypatch.setattr("sys.platform", "win32")
+    with writable_home():
+        assert "HOME" not in os.environ
+    assert not list(tmp_path.iterdir())
+
+
+# commands
+
+
+def test_a_twin_needs_a_tcp_port_where_there_are_no_pseudo_terminals(tmp_path: Path) -> None:
+    done = elsewhere("win32", "twin", folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "recoil: the twin cannot be plugged in here: this system has no pseudo-terminals; "
+        "try --tcp PORT, or another --link\n"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("system", ["win32", "darwin"])
+def test_a_study_from_a_new_folder_to_its_report(system: str, tmp_path: Path) -> None:
+    run = ["run", "pilot/direction.toml", "--screen", "synthetic", "--seed", "1", "--results", "pilot/simulated"]
+    for words in (
+        ["new", "pilot"],
+        ["check", "pilot/direction.toml"],
+        *([*run, "--participant", code] for code in ("CON", "S02")),  # the first is no name of a file on Windows
+        ["study", "pilot"],
+        ["rebuild", "pilot/simulated/sub-S02/sub-S02_task-direction_journal.jsonl"],
+        ["freeze", "pilot"],
+        ["analyze", "pilot/simulated", "--out", "pilot/analysis"],
+        ["doctor", "--results", "pilot/simulated"],
+    ):
+        done = elsewhere(system, *words, folder=tmp_path)
+        assert words[0] == "doctor" or done.returncode == 0, done.stderr  # what it finds is this machine's
+        assert not re.search(r"Traceback|(Attribute|Import|Module\w+)Error", f"{done.stdout}{done.stderr}"), words
+    assert (tmp_path / "pilot/analysis/report.html").exists()

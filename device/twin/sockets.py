@@ -41,11 +41,13 @@ class Pty:
         self.address = ""
 
     def plug(self) -> None:
-        """A new pseudo-terminal. `OSError`: something else is where the link is to be, or nothing can be made there."""
+        """A new pseudo-terminal. `OSError`: something else is where the link is to be, or none can be made here."""
         if self._ends is not None:
             return
         if self._link is not None and self._link.exists() and not self._link.is_symlink():
             raise FileExistsError(f"{self._link}: is no link, and would be lost")
+        if not hasattr(os, "openpty"):
+            raise OSError("this system has no pseudo-terminals")
         import tty  # noqa: PLC0415 - not on every system
 
         gun, host = os.openpty()
