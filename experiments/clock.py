@@ -118,7 +118,7 @@ def date_text(utc: str, zone: tzinfo | None = None) -> str:
     """
     try:
         moment = datetime.fromisoformat(utc).astimezone(zone)
-    except (ValueError, OverflowError):
+    except (ValueError, OverflowError, OSError):  # the last: before 1970, on Windows
         return utc
     day = f"{_DAYS[moment.weekday()]} {moment.day} {_MONTHS[moment.month - 1]} {moment.year}"
     return f"{day}, {time_text(moment)}"

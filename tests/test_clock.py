@@ -1,11 +1,12 @@
+import errno
 import threading
 import time
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 
 import pytest
 
 from experiments import clock as clock_module
-from experiments.clock import RealClock, VirtualClock
+from experiments.clock import RealClock, VirtualClock, date_text
 from tests.stolen_signal import Told, stolen_signal
 from tests.waiting import PATIENCE_S
 
@@ -60,6 +61,16 @@ def test_the_real_clock_is_the_machines() -> None:
     before = clock.now()
     clock.sleep(0.01)
     assert clock.now() >= before + 0.01
+
+
+def test_a_date_that_windows_has_no_local_time_of_stands_as_it_is() -> None:
+    class Refusing(tzinfo):
+        def utcoffset(self, _: datetime | None) -> timedelta:
+            raise OSError(errno.EINVAL, "Invalid argument")  # of a date before 1970
+
+        fromutc = utcoffset  # type: ignore[assignment]
+
+    assert date_text("1925-01-01T00:00:00Z", Refusing()) == "1925-01-01T00:00:00Z"
 
 
 def test_a_journal_can_tell_the_clocks_apart() -> None:
