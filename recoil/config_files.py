@@ -174,7 +174,8 @@ Edit the configs here; every number of the protocol is in them.
 | `recoil study .` | who is done, in progress, excluded, next |
 | `recoil analyze results --out analysis` | statistics, figures and report of all logs |
 
-Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names.
+Logs go to `results/`; it is readable by its owner only, on Windows by whoever may read this folder. Use codes for
+participants, never names.
 """
 
 
@@ -192,8 +193,9 @@ _README_OF_DESIGN = """# {title}
 | `recoil study .` | who is done, in progress, excluded, next |
 | `recoil analyze results --out analysis` | statistics, figures and report of all logs |
 
-Logs go to `results/`; it is readable by its owner only. Use codes for participants, never names. `study.toml` says how
-many people there are; who may take part is asked once you write [eligibility] into it.
+Logs go to `results/`; it is readable by its owner only, on Windows by whoever may read this folder. Use codes for
+participants, never names. `study.toml` says how many people there are; who may take part is asked once you write
+[eligibility] into it.
 """
 _KINDS = ("*.toml", "examples/*.toml", "synthetic/*.toml", "schemas/*.json")
 _PEOPLE = ("direction", "direction-felt", "preference", "preference-felt", "hurry-felt")
