@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 import serial
 
+from analysis.logs import files
 from analysis.predict import jobs
 from analysis.report import placing
 from device.sensor.streams import CsvSensor, SensorError
@@ -306,3 +307,17 @@ def test_a_study_from_a_new_folder_to_its_report(system: str, tmp_path: Path) ->
         assert words[0] == "doctor" or done.returncode == 0, done.stderr  # what it finds is this machine's
         assert not re.search(r"Traceback|(Attribute|Import|Module\w+)Error", f"{done.stdout}{done.stderr}"), words
     assert (tmp_path / "pilot/analysis/report.html").exists()
+
+
+# paths
+
+
+def test_logs_on_two_drives_are_named_by_their_whole_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: object) -> str:
+        raise ValueError("Paths don't have the same drive")
+
+    monkeypatch.setattr(os.path, "commonpath", refuse)
+    paths = [Path("/c/sub-P01/log.csv"), Path("/d/sub-P01/log.csv")]
+    assert files.folder_above(paths) == ""
+    assert [*files.names_below(paths).values()] == [Path("c/sub-P01/log.csv"), Path("d/sub-P01/log.csv")]
+    assert files.seen_from("/c/sub-P01/log.csv", "/d/sub-P01/log.csv") == "/c/sub-P01/log.csv"

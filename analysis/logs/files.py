@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
@@ -140,7 +140,15 @@ def names_below(files: Iterable[Path]) -> dict[Path, Path]:
 def folder_above(files: Iterable[Path]) -> str:
     """The folder that holds all of the files, empty if there are none."""
     folders = {_whole(file).rpartition(os.sep)[0] for file in files}
-    return os.path.commonpath(folders) if folders else ""
+    return common_folder(folders) if folders else ""
+
+
+def common_folder(paths: Collection[str]) -> str:
+    """The folder that holds all of some paths; empty where none does, as of two drives on Windows."""
+    try:
+        return os.path.commonpath(paths)
+    except ValueError:
+        return ""
 
 
 def name_below(file: Path, root: str) -> Path:
@@ -180,8 +188,8 @@ def seen_from(path: str, beside: str) -> str:
     >>> seen_from("lab/results/sub-P01/log.csv", "lab/copy/sub-P01/log.csv")
     'results/sub-P01/log.csv'
     """
-    folders = [Path(one).absolute().parent for one in (path, beside)]
-    return os.path.relpath(path, os.path.commonpath(folders))
+    folder = common_folder([str(Path(one).absolute().parent) for one in (path, beside)])
+    return os.path.relpath(path, folder) if folder else path
 
 
 def _study(real: str, top: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.logs.doubles import ODDS, STRETCH, Double
-from analysis.logs.files import Problem, seen_from
+from analysis.logs.files import Problem, common_folder, seen_from
 from analysis.stats.binomial import binomial_test_p
 
 PersonCalled = Callable[[int, int], str]
@@ -82,7 +81,7 @@ def turned_round(trials: pd.DataFrame, paths: Sequence[str]) -> Iterator[Problem
         return
     people = f"each of {len(right)} people is" if len(right) > 1 else "the one participant is"
     yield Problem(
-        file=Path(os.path.commonpath(paths)),
+        file=Path(common_folder(paths)),
         line=None,
         column=None,
         message=f"{people} right in fewer than half of the trials, in {total} of {count} altogether "
