@@ -142,7 +142,7 @@ class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
 
 
-_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last: Ctrl+Break, or a terminal that is closed, on Windows
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last: Ctrl+Break on Windows
 INTERRUPTS = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
 """The signals that end a command in order; no system knows all of them."""
 AWAKE_S = 0.2

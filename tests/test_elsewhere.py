@@ -7,6 +7,9 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,6 +24,7 @@ from device.serial_gun.lines import SerialPort
 from device.words import LinkError
 from experiments.record import storage
 from experiments.screens.participant.stage import writable_home
+from experiments.watch.folder import journals_in
 from tests.elsewhere import byte_locks
 
 ROOT = Path(__file__).parents[1]
@@ -62,7 +66,7 @@ def test_nobody_tells_the_time_by_another_clock() -> None:
 # signals
 
 
-def test_ctrl_break_and_a_closed_terminal_end_a_command_in_order() -> None:
+def test_ctrl_break_ends_a_command_in_order() -> None:
     look = "import signal, sys; signal.SIGBREAK = signal.SIGUSR1; del signal.SIGHUP; "
     look += "from device.words import INTERRUPTS as ours; sys.exit([*map(int, ours)] != [2, 15, signal.SIGBREAK])"
     assert subprocess.run([sys.executable, "-c", look], cwd=ROOT, check=False).returncode == 0
@@ -321,3 +325,35 @@ def test_logs_on_two_drives_are_named_by_their_whole_paths(monkeypatch: pytest.M
     assert files.folder_above(paths) == ""
     assert [*files.names_below(paths).values()] == [Path("c/sub-P01/log.csv"), Path("d/sub-P01/log.csv")]
     assert files.seen_from("/c/sub-P01/log.csv", "/d/sub-P01/log.csv") == "/c/sub-P01/log.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What Windows lists in a folder: of a file that is open it knows an old size, and no number."""
+
+    path: str
+
+    @property
+    def name(self) -> str:
+        return Path(self.path).name
+
+    def __fspath__(self) -> str:
+        return self.path
+
+    def stat(self) -> os.stat_result:
+        return os.stat_result((0o100600, *[0] * 9))
+
+
+def test_a_journal_that_grows_is_seen_to_grow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = os.listdir
+
+    @contextmanager
+    def scandir(folder: Path) -> Iterator[list[Entry]]:
+        yield [Entry(f"{folder}/{name}") for name in listed(folder)]
+
+    journal = tmp_path / "sub-P01" / "sub-P01_task-direction_journal.jsonl"
+    journal.parent.mkdir()
+    journal.write_bytes(b"grown")
+    monkeypatch.setattr(os, "scandir", scandir)
+    (found,) = journals_in(tmp_path).stats.values()
+    assert (found.st_ino, found.st_size) == (journal.stat().st_ino, 5)
