@@ -20,6 +20,8 @@ LIBRARIES = (
     *("scipy.optimize", "scipy.special", "scipy.stats", "serial", "serial.tools.list_ports", "statsmodels.api"),
     *("asyncio", "numba", "subprocess", "tempfile", "typer.core"),
 )
+OF_THE_SCREENS = ("PyQt6", "psychopy", "Xlib")
+"""Not everybody has them."""
 IN_OS = (
     *("O_CLOEXEC", "O_DIRECTORY", "O_NOCTTY", "O_NOFOLLOW", "O_NONBLOCK", "chown", "fchmod", "fork", "forkpty"),
     *("geteuid", "getpgid", "getuid", "killpg", "mkfifo", "nice", "openpty", "posix_spawn", "pread", "pwrite"),
@@ -77,6 +79,9 @@ def import_all() -> None:
                 continue
             try:
                 importlib.import_module(found.name)
+            except ModuleNotFoundError as error:
+                if (error.name or "").partition(".")[0] not in OF_THE_SCREENS:
+                    sys.stdout.write(f"{found.name}: {error}\n")
             except Exception as error:  # noqa: BLE001 - whatever it is, it is told
                 sys.stdout.write(f"{found.name}: {type(error).__name__}: {error}\n")
 

@@ -182,9 +182,7 @@ def _listed(folder: Path, problems: list[str]) -> list[os.DirEntry[str]]:
 def _stat(entry: os.DirEntry[str], problems: list[str]) -> os.stat_result | None:
     """What a name stands for; `None` if that cannot be told, or it was moved away just now."""
     try:
-        return Path(
-            entry
-        ).stat()  # an entry of Windows has no number, and an old size of what grows
+        return Path(entry).stat()  # an entry of Windows has no number, and an old size of what grows
     except OSError as error:
         if entry.is_symlink() or not isinstance(error, FileNotFoundError):
             problems.append(f"{entry.path}: cannot be read ({error.strerror}); it is left alone")
