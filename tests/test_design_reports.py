@@ -174,6 +174,24 @@ def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(
     assert "Share of kick" in section.tables[0].header
 
 
+def test_whiskers_of_numbers_are_said_to_be_of_their_logarithms():
+    factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
+    number, rating = {"kind": "number"}, {"kind": "rating", "minimum": 0, "maximum": 10, "grain": 1}
+    asked = {"strength": {**number, "text": "?"}, "real": {**rating, "text": "?"}}
+    table = pd.DataFrame({"participant_id": ["P1", "P1", "P2", "P2"], "method": "a", "voltage_V": [6.0, 10.0] * 2})
+    found = summarise(design(factors=factors, questions=asked), table.assign(strength=[1, 3, 2, 9], real=[1, 2, 3, 4]))
+    of_numbers = "the SD of ln between participants, up and down from the geometric mean"
+    for shown, said in (
+        (["strength"], of_numbers),
+        (["real"], "the SD between participants"),
+        (["strength", "real"], f"{of_numbers} of numbers, else the SD between participants"),
+    ):
+        some = replace(found, questions={name: found.questions[name] for name in shown})
+        statistics = StudyStatistics(designs={"test": some})
+        (section, *_) = sections_of_designs(ReportData(title="T", statistics=statistics))
+        assert section.pictures[0].caption.endswith(f" Whiskers: {said}.")
+
+
 def test_d_prime_is_said_to_be_pooled_and_stands_beside_the_mean_of_the_participants_own():
     found = summarise(detection(VOLTS), answered(SAID))
     tests = {(test.name, test.effect): test for test in found.questions["felt"].tests}

@@ -256,16 +256,28 @@ def lacking_conditions(found: DesignSummary) -> Iterator[str]:
 
 def _picture(name: str, found: DesignSummary) -> Picture:
     shown = {asked: question for asked, question in found.questions.items() if question.drawn}
-    scored = [question for question in shown.values() if any(cell.right is not None for cell in question.cells)]
-    parts = ["the exact 95 % interval of all trials together"] if scored else []
-    parts += ["the SD between participants"] if len(scored) < len(shown) and found.n > 1 else []
-    spread = f" Whiskers: {' of right answers, else '.join(parts)}." if parts else ""
     shares = [f"the share of {one.counted} ({asked})" for asked, one in shown.items() if one.counted]
-    spread = (f" Drawn is {joined_by_and(shares)}." if shares else "") + spread
+    drawn = f" Drawn is {joined_by_and(shares)}." if shares else ""
     means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in shown.items())
     return Picture(
-        stem=figure_of(name), caption=f"{found.title.rstrip('.?!')}.{spread}", alt=f"Means by condition. {means}"
+        stem=figure_of(name),
+        caption=f"{found.title.rstrip('.?!')}.{drawn}{_whiskers([*shown.values()], found.n)}",
+        alt=f"Means by condition. {means}",
     )
+
+
+def _whiskers(shown: Sequence[QuestionSummary], people: int) -> str:
+    """What the whiskers of a picture are, by what was asked."""
+    scored = [any(cell.right is not None for cell in question.cells) for question in shown]
+    unscored = {question.kind for question, right in zip(shown, scored, strict=True) if not right and people > 1}
+    parts = [("right answers", "the exact 95 % interval of all trials together")] if any(scored) else []
+    if "number" in unscored:
+        parts.append(("numbers", "the SD of ln between participants, up and down from the geometric mean"))
+    if unscored - {"number"}:
+        parts.append(("others", "the SD between participants"))
+    told = [f"{what} of {of}" for of, what in parts[:-1]]
+    told += [f"else {what}" if told else what for _, what in parts[-1:]]
+    return f" Whiskers: {', '.join(told)}." if told else ""
 
 
 _SPELLED_OUT = 12
