@@ -63,6 +63,16 @@ def test_a_third_answer_is_a_tie_and_half_a_choice(config: DesignConfig, table: 
     assert scores.conditions[0].scores[0].tie > 0
 
 
+def test_conditions_stand_in_the_order_of_the_design(config: DesignConfig, table: pd.DataFrame) -> None:
+    tables = config.model_dump()
+    tables["factors"]["hand"] = tables["factors"]["method"] | {"levels": ("one", "both"), "labels": {}, "sets": {}}
+    turned = paired_comparison(
+        DesignConfig.model_validate(tables), "rather", table.assign(hand=["both", "one"] * (len(table) // 2))
+    )
+    assert turned is not None
+    assert [one.levels["hand"] for one in turned.conditions] == ["one", "both"]
+
+
 def test_items_that_were_never_chosen_are_named(config: DesignConfig, table: pd.DataFrame) -> None:
     never = table[(table["method_1"] != "soft") & (table["method_2"] != "soft")]
     summary = summarise(config, never)

@@ -92,6 +92,15 @@ def test_a_scored_choice_has_chance_as_its_guess_rate_and_a_function_each_condit
     assert first.people[0].fit.threshold.median == pytest.approx(9.0, abs=0.5)
 
 
+def test_conditions_stand_in_the_order_of_the_design(config: DesignConfig, of_two: pd.DataFrame) -> None:
+    tables = config.model_dump()
+    tables["factors"]["method"]["levels"] = METHODS[::-1]
+    turned = thresholds(DesignConfig.model_validate(tables), "response", of_two)
+    assert turned is not None
+    assert [one.levels["method"] for one in turned.conditions] == [*METHODS[::-1]]
+    assert [(one.a["method"], one.b["method"]) for one in turned.differences] == [METHODS[::-1]]
+
+
 def test_the_difference_of_two_conditions_is_that_of_the_same_people(found: Thresholds) -> None:
     (one,) = found.differences
     assert (one.a, one.b) == ({"method": "asymmetric-1"}, {"method": "asymmetric-2"})

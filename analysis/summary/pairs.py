@@ -10,6 +10,7 @@ import pandas as pd
 
 from analysis.psychometric.paired import Consistency, PairedScores, circular_triads, paired_scores
 from analysis.stats.arrays import FloatArray
+from analysis.summary.thresholds import in_design_order
 from experiments.design.config import DesignConfig
 from experiments.design.language import Level
 
@@ -69,7 +70,7 @@ def paired_comparison(design: DesignConfig, name: str, table: pd.DataFrame) -> P
     others = [one for one, of in design.factors.items() if len(of.all_levels) > 1 and one != factor]
     conditions = tuple(
         _condition(levels, items, *_counts(some, name, factor, items, question.answers))
-        for levels, some in _by(rows, others)
+        for levels, some in _by(in_design_order(design, others, rows), others)
     )
     return PairedComparison(factor=factor, items=items, people=found.people, conditions=conditions)
 

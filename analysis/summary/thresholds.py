@@ -103,18 +103,19 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     level = pd.to_numeric(table[factor], errors="coerce")
     success = _successes(design, name, factor, share, table)
     even = int((success.isna() & table[name].notna() & level.notna()).sum()) if share == "chosen" else 0
-    answers = LevelledAnswers(
-        rows=table.assign(level=level, success=success),
-        conditions=tuple(
-            one
-            for one, of in design.factors.items()
-            if len(of.all_levels) > 1 and one not in {factor, question.correct}
-        ),
-        design=design,
-    )
+    others = [one for one, of in design.factors.items() if len(of.all_levels) > 1]
+    conditions = tuple(one for one in others if one not in {factor, question.correct})
+    rows = in_design_order(design, conditions, table).assign(level=level, success=success)
+    answers = LevelledAnswers(rows=rows, conditions=conditions, design=design)
     tracks = tuple(tracks_in(design, list(answers.conditions), answers.with_level))
     falls = False if design.adapted or share == "chosen" else None  # low levels follow right answers: no sign of a fall
     return fitted_thresholds(answers, replace(found, even=even, tracks=tracks), falls=falls, everybody=everybody)
+
+
+def in_design_order(design: DesignConfig, names: Sequence[str], table: pd.DataFrame) -> pd.DataFrame:
+    """A table whose groups by these factors come in the order of the design's levels."""
+    levels = {name: list(design.factors[name].all_levels) for name in names}
+    return table.astype({name: pd.CategoricalDtype(some, ordered=True) for name, some in levels.items()})
 
 
 def numeric_factor(design: DesignConfig) -> str | None:
