@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from scipy.stats import norm
 
 from analysis.psychometric.people import PersonFit
 from analysis.psychometric.priors import default_priors
 from analysis.report.figures import style
+from analysis.report.figures.style import method_marker
 from analysis.report.labels import labelled
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
@@ -268,6 +270,25 @@ def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
         legends = [legend.get_window_extent() for legend in figure.legends]
         assert len(legends) == methods - 1
         assert all(0 <= box.x0 < box.x1 <= figure.bbox.width for box in legends)
+
+
+def test_conditions_are_told_apart_without_colours(
+    config: DesignConfig, of_two: pd.DataFrame, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))
+    summary = summarise(config, of_two)
+    found = summary.questions["response"].thresholds
+    assert found is not None
+    figure_functions(summary, found, tmp_path / "never")
+    axes = shown[0].axes[0]
+    points = [some.get_offsets()[:, 0] for some in axes.collections if isinstance(some, PathCollection)]
+    assert all(one < other for one, other in zip(*map(np.asarray, points), strict=True))  # none hides another
+    assert np.mean(points, axis=0).tolist() == pytest.approx(LEVELS)
+    at_the_foot = [line.get_marker() for line in axes.lines if len(line.get_xdata()) == 1]  # type: ignore[arg-type]
+    assert at_the_foot == [method_marker(0), method_marker(1)]
+    (section,) = threshold_sections("made", summary)
+    assert "those of one level side by side" in section.pictures[0].caption
 
 
 def test_few_levels_have_each_a_tick_below_their_functions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -43,6 +43,8 @@ _MOST_POINTS, _JOINED = 12, 8
 _AREA = 90.0
 """Of the point with most trials, in square points."""
 _MOST_CURVES = 8
+_ASIDE, _ALL_ASIDE = 0.03, 0.12
+"""So far, as a share of the levels, points of two conditions stand apart, about a mark's width; and those of all."""
 
 _LABELS = {"right": "right [%]", "yes": "yes [%]", "chosen": "chosen over the standard [%]"}
 
@@ -99,23 +101,33 @@ def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
 
 def _draw(axes: Axes, curves: Sequence[_Curve], levels: FloatArray) -> None:
     light_grid(axes)
+    apart = (levels[-1] - levels[0]) * min(_ASIDE, _ALL_ASIDE / max(1, len(curves) - 1))
     for i, curve in enumerate(curves):
-        colour = method_colour(i)
+        colour, aside = method_colour(i), apart * (i - (len(curves) - 1) / 2)  # marks of several would hide each other
         if curve.shares is not None:
             middle, low, high = (100 * share for share in curve.shares)
             axes.fill_between(levels, low, high, color=colour, alpha=0.15, linewidth=0)
             axes.plot(levels, middle, color=colour, linestyle=method_line(i), linewidth=1.3)
-        _draw_points(axes, neighbours_joined(curve.points), i)
+        _draw_points(axes, neighbours_joined(curve.points), i, aside)
         if curve.threshold is not None:
-            foot = 2.5 + 4.0 * i
-            axes.plot([curve.threshold.low, curve.threshold.high], [foot, foot], color=colour, linewidth=2.0)
-            axes.plot([curve.threshold.median], [foot], "|", color=colour, markersize=9.0, mew=1.6)
+            _draw_threshold(axes, curve.threshold, i, alone=len(curves) == 1)
 
 
-def _draw_points(axes: Axes, points: Sequence[ShareAtLevel], i: int) -> None:
+def _draw_threshold(axes: Axes, found: Credible, i: int, *, alone: bool) -> None:
+    """At the foot; of several conditions each has its own mark, as colours alone are alike in grey."""
+    colour, foot = method_colour(i), 2.5 + 4.5 * i
+    axes.plot([found.low, found.high], [foot, foot], color=colour, linewidth=2.0)
+    if alone:
+        axes.plot([found.median], [foot], "|", color=colour, markersize=9.0, mew=1.6)
+    else:
+        axes.plot([found.median], [foot], method_marker(i), color=colour, markersize=5.5, mec="white", mew=0.5)
+
+
+def _draw_points(axes: Axes, points: Sequence[ShareAtLevel], i: int, aside: float) -> None:
     if not points:
         return
     at, right, trials = (np.array([getattr(one, name) for one in points]) for name in ("level", "right", "trials"))
+    at = at + aside
     exact = binomial_test(right, trials)
     axes.vlines(
         at, 100 * np.asarray(exact.ci_low), 100 * np.asarray(exact.ci_high), color=method_colour(i), linewidth=0.8
@@ -186,7 +198,7 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
     if len(of.conditions) > 1:
         for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
             name = ", ".join(drawn_name(found.label(factor, level)) for factor, level in condition.levels.items())
-            grid[0].plot([], [], **method_look(i), label=name)
+            grid[0].plot([], [], **method_look(i), markersize=4.5, linewidth=1.3, label=name)
         legend_below(figure, grid[0], 3, factor_words(of.factor))
     else:
         figure.supxlabel(factor_words(of.factor), fontsize=9.0)

@@ -148,11 +148,12 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
     rest = f" {more:,} more people have no panel; their numbers are in the table." if more > 0 else ""
     dashed = "the standard" if of.share == "chosen" else "chance" if of.guess is not None else ""
     group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
+    aside = ", those of one level side by side" if len(of.conditions) > 1 else ""
     caption = (
         f"{found.title.rstrip('.?!')}, {asked}: {group}a panel a participant. Points: shares with exact 95 % "
-        "intervals, their area the number of trials; of many levels neighbours are joined. Lines and bands: fitted "
-        f"curves with 95 % credible bands; bars at the foot: {_measure(of)} with its interval, left out where it is "
-        f"not within the levels.{f' Dashed: {dashed}.' if dashed else ''}{rest}"
+        f"intervals, their area the number of trials{aside}; of many levels neighbours are joined. Lines and bands: "
+        f"fitted curves with 95 % credible bands; bars at the foot: {_measure(of)} with its interval, left out where "
+        f"it is not within the levels.{f' Dashed: {dashed}.' if dashed else ''}{rest}"
     )
     said = "; ".join(threshold_words(found, of)) or "nobody's fit"
     return Picture(
