@@ -263,8 +263,10 @@ def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
     names = ["asymmetric force of one kind", "asymmetric force of another kind"]
     with labelled(dict(zip(METHODS, names, strict=True))), figure_files.full_size():
         figure_functions(summary, found, tmp_path / "never")
-        of_each = [replace(one, condition=method) for one in tracks.tracks for method in METHODS[:methods]]
-        figure_tracks(replace(tracks, tracks=tuple(of_each)), tmp_path / "never")
+        of_each = [
+            replace(one, condition=(("method", method),)) for one in tracks.tracks for method in METHODS[:methods]
+        ]
+        figure_tracks(summary, replace(tracks, tracks=tuple(of_each)), tmp_path / "never")
     for figure in shown:
         assert figure_files.touching(figure) == []
         legends = [legend.get_window_extent() for legend in figure.legends]
@@ -332,13 +334,32 @@ def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -
         | {"response": "forward" if right else "backward", "correct": right}
         for track, level, right in told * 4
     ]
-    found = thresholds(config, "response", pd.DataFrame(rows))
+    summary = summarise(config, pd.DataFrame(rows))
+    found = summary.questions["response"].thresholds
     assert found is not None
     first, second = found.tracks
     assert (first.track, first.levels[:3], first.successes[:3]) == (1, (12.0, 10.0, 11.0), (True, False, True))
     assert (second.track, second.levels[:2], second.successes[:2]) == (2, (12.0, 14.0), (False, True))
-    figure_tracks(found, tmp_path / "tracks")
+    figure_tracks(summary, found, tmp_path / "tracks")
     assert (tmp_path / "tracks.png").stat().st_size > 5000
+
+
+def test_tracks_call_conditions_as_the_design_does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    tables = load_setup("threshold").config.model_dump()
+    grips = {"levels": ("one", "both"), "labels": {"one": "with one hand", "both": "with both hands"}}
+    tables["factors"]["grip"] = tables["factors"]["method"] | grips
+    rows = [
+        {"participant_id": "A", "method": "asymmetric-1", "grip": grip, "track": 1, "voltage_V": level}
+        | {"direction": "forward", "response": "forward", "correct": 1}
+        for grip in ("both", "one")
+        for level in (12.0, 10.0)
+    ]
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))
+    summary = summarise(DesignConfig.model_validate(tables), pd.DataFrame(rows))
+    figure_tracks(summary, summary.questions["response"].thresholds, tmp_path / "never")  # type: ignore[arg-type]
+    (legend,) = shown[0].legends
+    assert [text.get_text() for text in legend.get_texts()] == ["with one hand", "with both hands"]
 
 
 def test_shares_that_a_procedure_held_are_neither_drawn_nor_compared_between_tracks() -> None:

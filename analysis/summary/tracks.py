@@ -8,16 +8,20 @@ from dataclasses import dataclass
 import pandas as pd
 
 from experiments.design.config import DesignConfig
+from experiments.design.plan import Condition
 
 TRACK = "track"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackAnswers:
-    """One person's track in one condition: its levels in the order they were felt, and whether each was a success."""
+    """One person's track in one condition: its levels in the order they were felt, and whether each was a success.
+
+    `condition`: each factor with its level.
+    """
 
     participant: str
-    condition: str
+    condition: Condition
     track: int
     levels: tuple[float, ...]
     successes: tuple[bool, ...]
@@ -35,7 +39,7 @@ def tracks_in(design: DesignConfig, conditions: list[str], rows: pd.DataFrame) -
         who, *levels, number = key
         yield TrackAnswers(
             participant=str(who),
-            condition=", ".join(map(str, levels)),
+            condition=tuple(zip(of, (one if isinstance(one, str) else float(str(one)) for one in levels), strict=True)),
             track=int(float(str(number))),
             levels=tuple(some["level"].astype(float)),
             successes=tuple(some["success"].astype(bool)),

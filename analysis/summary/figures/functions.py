@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -30,6 +30,7 @@ from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
 from analysis.summary.results import DesignSummary
 from analysis.summary.thresholds import ConditionFit, Thresholds
+from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
 MOST_PANELS = 19
@@ -181,6 +182,11 @@ def _has_room(levels: Sequence[float]) -> bool:
     )
 
 
+def drawn_condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
+    """What a condition is called in a figure: its levels, by what they are called."""
+    return ", ".join(drawn_name(found.label(factor, level)) for factor, level in levels.items())
+
+
 def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thresholds) -> None:
     if of.guess is not None:
         for axes in grid:
@@ -197,7 +203,7 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
     figure.supylabel(_LABELS[of.share], fontsize=9.0)
     if len(of.conditions) > 1:
         for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
-            name = ", ".join(drawn_name(found.label(factor, level)) for factor, level in condition.levels.items())
+            name = drawn_condition(found, condition.levels)
             grid[0].plot([], [], **method_look(i), markersize=4.5, linewidth=1.3, label=name)
         legend_below(figure, grid[0], 3, factor_words(of.factor))
     else:

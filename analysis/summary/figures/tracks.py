@@ -11,7 +11,6 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.report.figures.style import (
     drawn,
-    drawn_name,
     legend_below,
     light_grid,
     method_colour,
@@ -19,9 +18,12 @@ from analysis.report.figures.style import (
     method_marker,
     panel_grid,
 )
+from analysis.summary.figures.functions import drawn_condition
+from analysis.summary.results import DesignSummary
 from analysis.summary.thresholds import Thresholds
 from analysis.summary.tracks import TrackAnswers
 from experiments.design.methods_section import factor_words
+from experiments.design.plan import Condition
 
 MOST_TRACK_PANELS = 20
 """So many participants have a panel: a page is full."""
@@ -29,7 +31,7 @@ _ACROSS, _WIDE_IN, _HIGH_IN = 4, 2.3, 1.8
 _X_LABEL = "trial of the track"
 
 
-def figure_tracks(of: Thresholds, path_stem: Path) -> None:
+def figure_tracks(found: DesignSummary, of: Thresholds, path_stem: Path) -> None:
     """A panel for each of the first participants: level by trial, filled where it was a success; PNG, SVG and PDF."""
     people = list(dict.fromkeys(track.participant for track in of.tracks))[:MOST_TRACK_PANELS]
     conditions = list(dict.fromkeys(track.condition for track in of.tracks))
@@ -43,8 +45,9 @@ def figure_tracks(of: Thresholds, path_stem: Path) -> None:
         grid[0].xaxis.set_major_locator(MaxNLocator(4, integer=True))
         figure.supylabel(factor_words(of.factor), fontsize=9.0)
         if len(conditions) > 1:
-            for i, name in enumerate(conditions):
-                grid[0].plot([], [], color=method_colour(i), marker=method_marker(i), label=drawn_name(name))
+            for i, levels in enumerate(conditions):
+                name = drawn_condition(found, dict(levels))
+                grid[0].plot([], [], color=method_colour(i), marker=method_marker(i), label=name)
             legend_below(figure, grid[0], 3, _X_LABEL)
         else:
             figure.supxlabel(_X_LABEL, fontsize=9.0)
@@ -59,7 +62,7 @@ def _draw_threshold(axes: Axes, of: Thresholds, who: str) -> None:
         axes.axhline(found.median, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)))
 
 
-def _draw(axes: Axes, tracks: Sequence[TrackAnswers], conditions: Sequence[str]) -> None:
+def _draw(axes: Axes, tracks: Sequence[TrackAnswers], conditions: Sequence[Condition]) -> None:
     """A condition has its colour and mark, a track of it its line."""
     light_grid(axes)
     for track in tracks:

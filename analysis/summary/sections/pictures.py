@@ -76,7 +76,7 @@ def _write_models(folder: Path, name: str, design: DesignSummary) -> None:
         if question.thresholds is not None and question.thresholds.conditions:
             figure_functions(design, question.thresholds, folder / functions_figure_of(name, asked))
             if question.thresholds.tracks:
-                figure_tracks(question.thresholds, folder / tracks_figure_of(name, asked))
+                figure_tracks(design, question.thresholds, folder / tracks_figure_of(name, asked))
         if question.pairs is not None and has_scores(question.pairs):
             figure_pairs(design, question.pairs, folder / pairs_figure_of(name, asked))
 
