@@ -12,6 +12,7 @@ import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,10 +27,12 @@ from analysis.report.labels import cut_names, display_name, labelled, lines_of, 
 from analysis.report.section import Section, Table
 from analysis.report.streams import plain_letter
 from analysis.report.terminal import with_tables
+from analysis.summary.designs import summarise
 from analysis.summary.figures.results import figure_8, figure_directions
 from analysis.summary.figures.trade import figure_conditional_accuracy, figure_response_times
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.pictures import write_figures
 from analysis.summary.sections.sections import sections
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
@@ -44,6 +47,7 @@ from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from tests import figure_files
 from tests.conftest import RECOIL, Recoil
+from tests.designs import design
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows
 from tests.waiting import PATIENCE_S
 
@@ -311,6 +315,38 @@ def test_letters_that_no_font_has_are_said_once_and_the_code_is_drawn(
     assert {"v1", "plain"} <= written
     assert not any("鳥" in text for text in written)
     assert capsys.readouterr().err.count("no font on this machine has the letters 鳥 𓀀") == 1
+
+
+def test_ticks_have_no_boxes_for_letters_that_no_font_has_and_no_gaps_in_words(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(glyphs, "_installed", list)
+    monkeypatch.setattr(glyphs, "_chosen", [])
+    names = ["Donaudampfschifffahrt", "ramp-up-slowly", "𓀀"]
+    with figure_files.full_size():
+        for width, shown in (
+            (2.0, [*names[:2], r"\U00013000"]),
+            (7.0, ["Donaudampf\nschifffahr\nt", "ramp-up-\nslowly"]),
+        ):
+            with style.drawn(tmp_path / "figure", width, 2.0) as figure:
+                axes = figure.subplots()
+                style.name_ticks(axes, names)
+            assert [tick.get_text() for tick in axes.get_xticklabels()][: len(shown)] == shown
+
+
+def test_designs_levels_go_by_their_codes_in_figures_where_no_font_has_their_labels(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(glyphs, "_installed", list)
+    monkeypatch.setattr(glyphs, "_chosen", [])
+    shown: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))
+    factors = {"method": {"levels": ["strong", "weak"], "labels": {"strong": "𓀀 鳥", "weak": "Weak"}}}
+    rating = {"kind": "rating", "text": "?", "minimum": 0, "maximum": 10, "grain": 1}
+    table = pd.DataFrame({"participant_id": ["P1", "P1"], "method": ["strong", "weak"], "real": [3, 4]})
+    found = summarise(design(factors=factors, questions={"real": rating}), table)
+    write_figures(tmp_path, ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
+    assert [tick.get_text() for tick in shown[0].axes[0].get_xticklabels()] == ["strong", "Weak"]
 
 
 def test_a_report_of_ten_methods_has_tables_instead_of_long_paragraphs(ten: StudyStatistics) -> None:

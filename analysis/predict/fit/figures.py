@@ -16,8 +16,8 @@ from analysis.report.figures.style import (
     light_grid,
     method_colour,
     method_line,
+    names_at,
     reference_line,
-    wrapped,
 )
 
 _Numbers = Sequence[float]
@@ -80,7 +80,7 @@ def figure_percept(curves: Sequence[RateCurve], points: Sequence[RatePoint], pat
         for place, point in enumerate(apart):
             _draw_point(left, float(place), point, "o")
         left.set_xlim(-0.6, max(len(apart), 1) - 0.4)
-        left.set_xticks(range(len(apart)), [wrapped(point.name) for point in apart])
+        names_at(left, range(len(apart)), [point.name for point in apart])
         left.set_ylabel("answered “forward” to a forward shot [%]")
         for i, curve in enumerate(curves):
             _draw_curve(right, i, curve)

@@ -15,7 +15,6 @@ from matplotlib import font_manager
 from matplotlib.figure import Figure
 from matplotlib.ft2font import FaceFlags, FT2Font
 from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter
 
 OWN_FONT = "DejaVu Sans"
 _FITTING = ("hei", "gothic", "sans")
@@ -39,9 +38,7 @@ def give_fonts(figure: Figure) -> None:
     families, undrawn = _fonts_for(letters)
     for text in texts:
         text.set_fontfamily([OWN_FONT, *families])
-        text.set_text(_escaped(text.get_text(), undrawn))
-    for formatter in _fixed_labels(figure):  # they set the texts of ticks again
-        formatter.seq = [_escaped(label, undrawn) for label in formatter.seq]
+        text.set_text(drawable_text(text.get_text()))  # but for those of ticks, which are named by `drawn_name`
     _say(undrawn)
 
 
@@ -106,22 +103,11 @@ def _registered(path: str, font: FT2Font) -> str:
     return str(font.family_name)
 
 
-def _fixed_labels(figure: Figure) -> Iterator[FixedFormatter]:
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            formatter = axis.get_major_formatter()
-            if isinstance(formatter, FixedFormatter):
-                yield formatter
-
-
-def _escaped(text: str, undrawn: frozenset[str]) -> str:
-    r"""A text with letters as their escapes.
-
-    >>> print(_escaped("力 1", frozenset("力")))
-    \u529b 1
-    """
-    escapes = {ord(letter): letter.encode("ascii", "backslashreplace").decode() for letter in undrawn}
-    return text.translate(escapes)
+def drawable_text(text: str) -> str:
+    """A text with the letters that no font of this machine has as their escapes."""
+    letters = lacking(text)
+    undrawn = _fonts_for(letters)[1] if letters else frozenset()
+    return text.translate({ord(letter): letter.encode("ascii", "backslashreplace").decode() for letter in undrawn})
 
 
 def _say(undrawn: Iterable[str]) -> None:

@@ -18,9 +18,10 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter
 
 from analysis.report.copies import in_copy
-from analysis.report.figures.glyphs import OWN_FONT, give_fonts, is_drawable
+from analysis.report.figures.glyphs import OWN_FONT, drawable_text, give_fonts, is_drawable
 from analysis.report.labels import cut_names, display_name, lines_of, some_labels, text_columns
 from analysis.report.section import MAKER, PNG_DPI
 from experiments.record.storage import errors_name
@@ -143,9 +144,9 @@ def _touch(axes: Axes) -> bool:
 
 
 def _put_upright(axes: Axes) -> None:
-    places = axes.get_xticks()
-    names = [" ".join(tick.get_text().split("\n")) for tick in axes.get_xticklabels()]
-    axes.set_xticks(places, names, rotation=90.0)
+    names = axes.xaxis.get_major_formatter()
+    if isinstance(names, _NamesBelow):
+        axes.set_xticks(axes.get_xticks(), names.whole, rotation=90.0)
 
 
 _KEY_PT = 7.5
@@ -255,14 +256,26 @@ def name_ticks(axes: Axes, methods: Sequence[str], above: Sequence[str] = (), ro
 
     `room_in`: how wide the panel is, where that is not the whole figure.
     """
-    before = [f"{line}\n" for line in above] or [""] * len(methods)
+    names_at(axes, range(len(methods)), methods, above)
     if (room_in or axes.figure.bbox.width / PNG_DPI) < _APART_IN * len(methods):
-        names = [f"{line.strip()}  {drawn_name(method)}".strip() for line, method in zip(before, methods, strict=True)]
-        axes.set_xticks(range(len(methods)), names, rotation=90.0)
-    else:
-        names = [f"{line}{wrapped(method)}" for line, method in zip(before, methods, strict=True)]
-        axes.set_xticks(range(len(methods)), names)
+        _put_upright(axes)
     axes.set_xlim(-0.6, len(methods) - 0.4)
+
+
+class _NamesBelow(FixedFormatter):
+    """Names in short lines, and `whole` in one for where they stand upright: joined lines would part broken words."""
+
+    def __init__(self, names: Sequence[str], above: Sequence[str]) -> None:
+        named = [*zip(above or [""] * len(names), names, strict=True)]
+        super().__init__([f"{line}\n{wrapped(name)}".strip() for line, name in named])
+        self.whole = [f"{' '.join(line.split())}  {drawn_name(name)}".strip() for line, name in named]
+
+
+def names_at(axes: Axes, places: Sequence[float], names: Sequence[str], above: Sequence[str] = ()) -> None:
+    """A tick with its name below it at each place; `above`: a line over each name."""
+    below = _NamesBelow(names, above)
+    axes.set_xticks(places, below.seq)  # whose letters are known at once, to find fonts for
+    axes.xaxis.set_major_formatter(below)
 
 
 def legend_columns(width_in: float, names: Sequence[str], most: int = 3) -> int:
@@ -274,11 +287,13 @@ def legend_columns(width_in: float, names: Sequence[str], most: int = 3) -> int:
 def drawn_name(code: str) -> str:
     r"""What a method or level is called in a figure: its code where no font here has the letters of its label.
 
+    Letters of the code that no font has either are escaped.
+
     >>> drawn_name("asymmetric-1"), drawn_name("2 $ a shot")
     ('Asymmetric Force I', '2 \\$ a shot')
     """
     name = display_name(code)
-    return (name if is_drawable(name) else code).replace("$", r"\$")  # which begins no formula here
+    return drawable_text(name if is_drawable(name) else code).replace("$", r"\$")  # which begins no formula here
 
 
 def wrapped(code: str) -> str:

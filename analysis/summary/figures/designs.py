@@ -20,9 +20,9 @@ from analysis.report.figures.style import (
     method_line,
     method_marker,
     name_ticks,
+    names_at,
     reference_line,
     width_for,
-    wrapped,
 )
 from analysis.report.labels import text_columns
 from analysis.summary.question_results import ConditionSummary, QuestionSummary
@@ -215,7 +215,7 @@ def _tick(axes: Axes, question: QuestionSummary, places: Mapping[Level, float], 
     if len(places) == 1 or any(isinstance(level, str) for level in places):
         name_ticks(axes, names, room_in=_panel_width(question))
     elif len(places) <= _TICKS:
-        axes.set_xticks([*places.values()], [wrapped(name) for name in names])
+        names_at(axes, [*places.values()], names)
         axes.xaxis.minorticks_off()
     _add_legend(axes, question)
 

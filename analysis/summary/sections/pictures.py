@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
+from analysis.report.figures.glyphs import is_drawable
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
@@ -49,11 +51,20 @@ def write_figures(folder: Path, report: ReportData) -> None:
         figure_8(statistics, folder / _RESULTS_FIGURE, report.rated_from)
     if direction is not None and direction.n:
         _write_direction(folder, direction)
-    for name, one in statistics.designs.items():
+    for name, one in ((name, _drawable(found)) for name, found in statistics.designs.items()):
         _write_design(folder, name, one)
         _write_models(folder, name, one)
     if report.delivered:
         figure_delivered(report.delivered, folder / DELIVERED_FIGURE)
+
+
+def _drawable(design: DesignSummary) -> DesignSummary:
+    """A design whose levels go by their codes where no font here has the letters of their labels."""
+    labels = {
+        factor: {level: label for level, label in some.items() if is_drawable(label)}
+        for factor, some in design.labels.items()
+    }
+    return replace(design, labels=labels)
 
 
 def _write_design(folder: Path, name: str, design: DesignSummary) -> None:
