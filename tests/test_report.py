@@ -123,6 +123,13 @@ def test_the_html_stands_alone(full: Path) -> None:
         assert words in page
 
 
+def test_in_print_everything_is_measured_by_one_size_of_letters(full: Path) -> None:
+    """Tables and captions are in rem, which are of the root: a size of the body alone made paragraphs the smallest."""
+    page = (full / "report.html").read_text(encoding="utf-8")
+    printed = page[page.index("@media print") : page.index("</style>")]
+    assert re.findall(r"([\w, :]+) \{[^{}]*font-size", printed) == ["  :root"]
+
+
 def test_what_was_typed_is_never_markup(full: Path) -> None:
     page = (full / "report.html").read_text(encoding="utf-8")
     assert "<title>Recoil &amp; co: a &lt;study&gt;</title>" in page
