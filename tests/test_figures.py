@@ -4,7 +4,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.logs.reading import read_logs
+from analysis.paper.recurrence import ShareOfStudies
+from analysis.predict.power.figures import Curve, Panel, figure_power
 from analysis.report.figures import style
 from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import stars
@@ -296,6 +298,22 @@ def test_a_figure_of_one_participant_and_four_unknown_methods_is_drawn(tmp_path:
     text = svg.read_text(encoding="utf-8")
     assert "Preference" in text
     assert "(a)" not in text  # there is no other panel
+
+
+@pytest.mark.parametrize(
+    ("sizes", "shown"), [((8, 12, 16, 20), [8, 12, 16, 20]), (range(8, 49), [8, 16, 24, 32, 40, 48])]
+)
+def test_ticks_of_power_stand_at_the_designs_that_were_simulated_where_these_are_few(
+    sizes: Sequence[int], shown: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: figures.append(figure))
+    share = ShareOfStudies(claim="F", held=1, share=0.5, ci_low=0.4, ci_high=0.6)
+    panel = Panel(title="effect × 1", curves=[Curve(name="ANOVA", points=[(size, share) for size in sizes])])
+    figure_power([[panel]], "participants", 0.8, tmp_path / "never")
+    (axes,) = figures[0].axes
+    low, high = axes.get_xlim()
+    assert [tick for tick in axes.get_xticks() if low <= tick <= high] == shown
 
 
 def test_without_data_there_is_no_figure(tmp_path: Path) -> None:

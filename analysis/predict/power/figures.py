@@ -14,6 +14,7 @@ from analysis.predict.power.results import DesignPower
 from analysis.report.figures.style import (
     bounded,
     drawn,
+    have_room,
     legend_below,
     light_grid,
     method_colour,
@@ -85,7 +86,11 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
             axes.vlines(x, low, high, color=colour, linewidth=1.3)
     axes.set_ylim(-2.0, 103.0)
     axes.set_yticks(range(0, 101, 20))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
+    sizes = sorted({x for curve in panel.curves for x, _ in curve.points})
+    if have_room(sizes):
+        axes.set_xticks(sizes)
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
     bounded(axes, 0.0, 100.0)
     axes.set_title(panel.title, loc="left")
 

@@ -67,6 +67,23 @@ def drawn(path_stem: Path, width_in: float, height_in: float) -> Iterator[Figure
         in_copy(lambda _: save(figure, path_stem))
 
 
+_AXIS_IN, _DIGIT_IN = 1.6, 0.08
+"""So wide are the levels of one of several panels, and at the most a digit below it."""
+
+
+def have_room(levels: Sequence[float]) -> bool:
+    """Whether the numbers of all levels can stand side by side below a panel.
+
+    >>> have_room([17.0, 18.0, 20.0]), have_room([0.1, 0.11, 20.0]), have_room([float(level) for level in range(40)])
+    (True, False, False)
+    """
+    across_in = _AXIS_IN / ((levels[-1] - levels[0]) or 1.0)
+    return all(
+        (after - before) * across_in > _DIGIT_IN * ((len(f"{before:g}") + len(f"{after:g}")) / 2 + 1)
+        for before, after in pairwise(levels)
+    )
+
+
 def panel_grid(figure: Figure, titles: Sequence[str], across: int) -> list[Axes]:
     """A panel under each title, so many beside each other on shared axes; only the lowest have numbers below."""
     rows = -(-len(titles) // across)

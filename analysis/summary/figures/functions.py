@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from analysis.psychometric.people import ShareAtLevel, mean_curve
 from analysis.report.figures.style import (
     drawn,
     drawn_name,
+    have_room,
     legend_below,
     light_grid,
     method_colour,
@@ -36,8 +36,6 @@ from experiments.design.methods_section import factor_words
 MOST_PANELS = 19
 """So many participants have a panel: with that of all people a page is full."""
 _ACROSS, _WIDE_IN, _HIGH_IN = 4, 2.3, 2.1
-_AXIS_IN, _DIGIT_IN = 1.6, 0.08
-"""So wide are the levels of a panel, and at the most a digit below it."""
 _CURVE = 101
 _MOST_POINTS, _JOINED = 12, 8
 """Of more levels than this, neighbours are joined into so many points: those of an adaptive run have a trial each."""
@@ -169,19 +167,6 @@ def neighbours_joined(points: Sequence[ShareAtLevel]) -> list[ShareAtLevel]:
     ]
 
 
-def _has_room(levels: Sequence[float]) -> bool:
-    """Whether the numbers of all levels can stand side by side below a panel.
-
-    >>> _has_room([17.0, 18.0, 20.0]), _has_room([0.1, 0.11, 20.0]), _has_room([float(level) for level in range(40)])
-    (True, False, False)
-    """
-    across_in = _AXIS_IN / ((levels[-1] - levels[0]) or 1.0)
-    return all(
-        (after - before) * across_in > _DIGIT_IN * ((len(f"{before:g}") + len(f"{after:g}")) / 2 + 1)
-        for before, after in pairwise(levels)
-    )
-
-
 def drawn_condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
     """What a condition is called in a figure: its levels, by what they are called."""
     return ", ".join(drawn_name(found.label(factor, level)) for factor, level in levels.items())
@@ -196,7 +181,7 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
             axes.axvline(of.standard, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     grid[0].set_ylim(-3.0, 103.0)
     levels = sorted({point.level for condition in of.conditions for point in condition.points})
-    if _has_room(levels):
+    if have_room(levels):
         grid[0].set_xticks(levels, [f"{level:g}" for level in levels])
     else:
         grid[0].xaxis.set_major_locator(MaxNLocator(4))
