@@ -145,6 +145,9 @@ def test_a_backward_shot_is_the_forward_one_s_mirror_but_for_the_bias(found: Any
 @pytest.mark.slow
 def test_the_page_and_the_figures_are_there(found: Any, folder: Path) -> None:
     assert {path.stem for path in (folder / "figures").iterdir()} == {"percept", "places"}
+    page = (folder / "report.md").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    (told,) = re.findall(r"!\[Forward rate over friction\. fit: [^:]+: ([\d.]+) % at 0 N, ([\d.]+) % at 1\.4 N;", page)
+    assert 70 < float(told[0]) < float(told[1]) < 100  # the curve rises, as the picture shows
     assert "data:image/png;base64," in (folder / "report.html").read_text(encoding="utf-8")
 
 

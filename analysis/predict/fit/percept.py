@@ -27,7 +27,7 @@ from analysis.predict.fit.studies import (
 )
 from analysis.predict.synthetic_studies import piece_sizes, spread_sentence
 from analysis.report import apa, placing
-from analysis.report.labels import labelled
+from analysis.report.labels import display_name, labelled
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
@@ -257,6 +257,7 @@ def _predictions(found: FittedPercept, figures: Path) -> Section:
     points = [_point(found, name, frictions.get(name)) for name in found.rates]
     curves = [line for curve in found.friction for line in _curves(found, curve)]
     figure_percept(curves, points, figures / "percept")
+    observed = ", ".join(f"{display_name(point.name)} {apa.percent(point.rate)}" for point in points)
     return Section(
         title="Predicted over the damper's friction",
         paragraphs=(
@@ -270,10 +271,15 @@ def _predictions(found: FittedPercept, figures: Path) -> Section:
                     "Forward rate predicted by the fit over the damper's friction (band: 95 %), with the observed "
                     "rates (bars: Wilson's 95 % interval, trials taken as independent)"
                 ),
-                alt="A falling and rising curve of the forward rate over friction with the observed points on it",
+                alt=f"Forward rate over friction. {'; '.join(map(_ends_words, curves))}. Observed: {observed}.",
             ),
         ),
     )
+
+
+def _ends_words(curve: RateCurve) -> str:
+    first, last = (f"{apa.percent(curve.rate[end])} at {curve.friction_N[end]:g} N" for end in (0, -1))
+    return f"{curve.name}: {first}, {last}"
 
 
 def _point(found: FittedPercept, name: str, friction_N: float | None) -> RatePoint:
