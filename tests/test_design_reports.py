@@ -19,6 +19,7 @@ from analysis.summary.figures.designs import figure_design
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
+from tests import figure_files
 from tests.designs import design
 
 VOLTS = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
@@ -158,6 +159,24 @@ def test_ranks_have_their_degrees_of_freedom_their_people_and_their_agreement():
     ranked = replace(found.questions["q"], kind="ranking")  # of which it is the planned test
     (said,) = result_sentences("test", replace(found, questions={"q": ranked}))
     assert f"Friedman's test of method: {statistics}, {row[5].removesuffix(', N = 5')}." in said
+
+
+def test_a_legend_stands_below_the_name_of_the_axis_however_low_the_panels_are(tmp_path, monkeypatch):
+    name = "a long name of a level in four lines"
+    coats = {"levels": [*"abcdefgh"], "labels": {level: f"{level} {name}"[:31] for level in "abcdefgh"}}
+    factors = {"method": {"levels": ["a"]}, "coat": coats, "grip": {"levels": ["one", "two"]}}
+    rating = {"kind": "rating", "text": "?", "minimum": 0, "maximum": 10, "grain": 1}
+    rows = [("P1", "a", coat, grip) for coat in "abcdefgh" for grip in ("one", "two")]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "coat", "grip"]).assign(q=4, r=5, s=6)
+    found = summarise(design(factors=factors, questions=dict.fromkeys("qrs", rating)), table)
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: (style.lay_out(figure), drawn.append(figure)))
+    with figure_files.full_size():
+        figure_design(found, tmp_path / "figure")
+        for axes in drawn[0].axes[:3]:
+            called, legend = axes.xaxis.label.get_window_extent(), axes.get_legend().get_window_extent()
+            assert max(tick.get_text().count("\n") for tick in axes.get_xticklabels()) == 3
+            assert legend.y1 < called.y0
 
 
 def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.transforms import ScaledTranslation
 
 from analysis.report.figures.style import (
     MANY_METHODS,
@@ -38,6 +39,8 @@ _ASIDE = 0.012
 """So far, as a share of the axis, two series of numbers stand apart: about a mark's width."""
 _EVEN_STEPS, _WITH_HALVES = 1.0, 2.5
 """Over fewer decades a logarithmic axis has ticks in even steps, and at 2 and 5 of each decade too."""
+_NAMES_IN, _LINE_IN = 0.48, 0.165
+"""So high are names of one line below an axis and what the axis is called, and each further line."""
 _PLAIN = 1e-4, 1e6
 """Numbers between these stand at ticks as they are."""
 
@@ -228,12 +231,14 @@ def _add_legend(axes: Axes, question: QuestionSummary) -> None:
         ticks = axes.get_xticklabels()
         upright = any(tick.get_rotation() for tick in ticks)
         lines = [text_columns(tick.get_text()) / 2.0 if upright else tick.get_text().count("\n") for tick in ticks]
+        below = _NAMES_IN + _LINE_IN * max([0.0, *lines])  # however low the panel is
         axes.legend(
             frameon=False,
             fontsize=8.0,
             title=others,
             title_fontsize=8.0,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.17 - 0.06 * max([0.0, *lines])),
+            bbox_to_anchor=(0.5, 0.0),
+            bbox_transform=axes.transAxes + ScaledTranslation(0.0, -below, axes.figure.dpi_scale_trans),
             ncols=legend_columns(_panel_width(question), labels, _LEGEND_COLUMNS),
         )
