@@ -179,6 +179,28 @@ def test_a_legend_stands_below_the_name_of_the_axis_however_low_the_panels_are(t
             assert legend.y1 < called.y0
 
 
+@pytest.mark.parametrize(
+    ("ends", "shown"),
+    [
+        ({}, "q (1 to 7)"),
+        ({"minimum_text": "no $", "maximum_text": "yes"}, r"q (1 = no \$, 7 = yes)"),
+        (
+            {"minimum_text": "not at all", "maximum_text": "completely so"},
+            "q\n(1 = not at all, 7 = completely so)",
+        ),
+        ({"minimum_text": "a text as long as a sentence " * 4}, "q"),
+    ],
+)
+def test_the_axis_of_a_rating_says_its_scale_where_that_is_short(ends, shown, tmp_path, monkeypatch):
+    rating = {"kind": "rating", "text": "?", "minimum": 1, "maximum": 7, "grain": 1, **ends}
+    table = pd.DataFrame({"participant_id": "P1", "method": ["a", "b"], "q": [3, 4]})
+    found = summarise(design(factors={"method": {"levels": ["a", "b"]}}, questions={"q": rating}), table)
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(found, tmp_path / "figure")
+    assert drawn[0].axes[0].get_ylabel() == shown
+
+
 def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(tmp_path, monkeypatch):
     factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
     asked = {"kind": "choice", "text": "?", "answers": ["kick", "buzz"]}

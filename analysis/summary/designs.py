@@ -160,8 +160,10 @@ def _scale(question: QuestionConfig) -> str | None:
     """What the numbers of a rating or ranking mean."""
     if question.kind == "ranking":
         return f"1 = {question.minimum_text}"
-    if question.kind != "rating" or not (question.minimum_text or question.maximum_text):
+    if question.kind != "rating":
         return None
+    if not (question.minimum_text or question.maximum_text):
+        return f"{question.minimum:g} to {question.maximum:g}"
     ends = ((question.minimum, question.minimum_text), (question.maximum, question.maximum_text))
     return ", ".join(f"{end:g} = {text}" for end, text in ends if text)
 

@@ -41,6 +41,8 @@ _EVEN_STEPS, _WITH_HALVES = 1.0, 2.5
 """Over fewer decades a logarithmic axis has ticks in even steps, and at 2 and 5 of each decade too."""
 _NAMES_IN, _LINE_IN = 0.48, 0.165
 """So high are names of one line below an axis and what the axis is called, and each further line."""
+_UPWARD = 36
+"""So many columns of text fit beside an axis of numbers."""
 _PLAIN = 1e-4, 1e6
 """Numbers between these stand at ticks as they are."""
 
@@ -204,13 +206,22 @@ def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None)
     scored = any(cell.right is not None for cell in question.cells)
     of = "hits" if question.detected else "right" if scored else "chosen"
     share = f"share of {drawn_name(question.counted)} [%]" if question.counted else f"{of} [%]"
-    axes.set_ylabel(share if question.kind in ("choice", "yes-no") else name)
+    axes.set_ylabel(share if question.kind in ("choice", "yes-no") else _with_scale(name, question))
     axes.set_xlabel(factor_words(factor) if factor else "")
     axes.set_title(name, loc="left", fontweight="bold", parse_math=False)
     if scored and question.chance is not None and question.kind == "choice":
         reference_line(axes, 100.0 * question.chance, "chance")
     if question.kind in ("choice", "yes-no"):
         axes.set_ylim(-3.0, 103.0)
+
+
+def _with_scale(name: str, question: QuestionSummary) -> str:
+    """A rating or ranking with what its numbers mean, below it where both take more than a line, if it fits there."""
+    scale = f"({question.scale})" if question.scale else ""
+    if not scale or text_columns(scale) > _UPWARD:
+        return name
+    apart = " " if text_columns(f"{name} {scale}") <= _UPWARD else "\n"
+    return f"{name}{apart}{scale}".replace("$", r"\$")  # which begins no formula here
 
 
 def _tick(axes: Axes, question: QuestionSummary, places: Mapping[Level, float], names: Sequence[str]) -> None:
