@@ -30,7 +30,7 @@ from tests.elsewhere import byte_locks
 ROOT = Path(__file__).parents[1]
 
 
-def elsewhere(system: str, *words: str, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
+def elsewhere(system: str, *words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """A command as another system would carry it out."""
     return subprocess.run(
         [sys.executable, "-m", "tests.elsewhere", system, *words],
@@ -43,8 +43,8 @@ def elsewhere(system: str, *words: str, folder: Path = ROOT) -> subprocess.Compl
 
 
 @pytest.mark.parametrize("system", ["win32", "darwin"])
-def test_every_module_can_be_imported(system: str) -> None:
-    done = elsewhere(system, "import")
+def test_every_module_can_be_imported(system: str, tmp_path: Path) -> None:
+    done = elsewhere(system, "import", folder=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
