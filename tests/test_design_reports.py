@@ -269,3 +269,21 @@ def test_a_condition_of_several_factors_is_called_by_its_levels_beside_its_d_pri
     way = pd.Series(["forward", "backward"] * (len(table) // 2)).where(table["stimulus"] == 1)
     (_, by_test) = tables_of(summarise(detection(ways), table.assign(direction=way)))
     assert "6 V, backward" in [row[1] for row in by_test.rows]
+
+
+def test_the_lowest_and_highest_of_many_conditions_are_those_of_the_shares_that_are_told():
+    """Who has few trials moves the mean over people, and not the share of all: 6 V is lowest by the one alone."""
+    factors = {"method": {"levels": ["a"]}, "direction": {"levels": ["forward"]}}
+    factors["voltage_V"] = {"levels": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]}
+    question = {"kind": "choice", "text": "?", "answers": ["forward", "backward"], "correct": "direction"}
+    right = {volts: {"P1": (3, 4), "P2": (3, 4)} for volts in (1.0, 2.0, 3.0, 4.0, 5.0)}
+    right |= {6.0: {"P1": (0, 1), "P2": (9, 10)}, 7.0: {"P1": (5, 10), "P2": (1, 2)}}
+    rows = [
+        (person, "a", "forward", volts, "forward" if trial < count else "backward", int(trial < count))
+        for volts, people in right.items()
+        for person, (count, trials) in people.items()
+        for trial in range(trials)
+    ]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "direction", "voltage_V", "q", "correct"])
+    (said,) = result_sentences("test", summarise(design(factors=factors, questions={"q": question}), table))
+    assert "right answers of 7 conditions went from 50.0 % (6 of 12) (7 V) to 81.8 % (9 of 11) (6 V)." in said

@@ -97,8 +97,8 @@ def _spread_words(found: DesignSummary, question: QuestionSummary) -> str:
     cells = question.preferred or question.cells
     shown = [f"{_condition(found, cell)}: {_mean_and_spread(question, cell)}" for cell in cells]
     if len(shown) > _TOLD:
-        ends = sorted(cells, key=lambda cell: (cell.mean is None, cell.mean or 0.0))
-        ends = [cell for cell in ends if cell.mean is not None] or ends
+        known = [cell for cell in cells if _shown(cell) is not None] or cells
+        ends = sorted(known, key=lambda cell: _shown(cell) or 0.0)
         low, high = (f"{_mean_and_spread(question, cell)} ({_condition(found, cell)})" for cell in (ends[0], ends[-1]))
         return f"{_mean_word(question)} of {len(cells)} conditions went from {low} to {high}."
     opening = "" if question.kind == "rating" else f"{_mean_word(question)}, "
@@ -300,10 +300,13 @@ def _condition(found: DesignSummary, cell: ConditionSummary) -> str:
     return ", ".join(filter(None, [*levels, rest]))
 
 
+def _shown(cell: ConditionSummary) -> float | None:
+    """What stands for a condition: of scored answers the share of all that are right, else the mean over people."""
+    return cell.mean if cell.right is None else cell.right / cell.trials
+
+
 def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
-    if cell.right is not None:
-        return apa.percent(cell.right / cell.trials)
-    return apa.percent(cell.mean) if question.kind in ("choice", "yes-no") else apa.number(cell.mean)
+    return (apa.percent if question.kind in ("choice", "yes-no") else apa.number)(_shown(cell))
 
 
 def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Iterator[Table]:
