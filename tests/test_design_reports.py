@@ -16,6 +16,7 @@ from analysis.report.figures import style
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.figures.designs import figure_design
+from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
@@ -287,3 +288,28 @@ def test_the_lowest_and_highest_of_many_conditions_are_those_of_the_shares_that_
     table = pd.DataFrame(rows, columns=["participant_id", "method", "direction", "voltage_V", "q", "correct"])
     (said,) = result_sentences("test", summarise(design(factors=factors, questions={"q": question}), table))
     assert "right answers of 7 conditions went from 50.0 % (6 of 12) (7 V) to 81.8 % (9 of 11) (6 V)." in said
+
+
+def rated():
+    """A rating of three methods by four people."""
+    question = {"kind": "rating", "text": "?", "minimum": 0, "maximum": 10, "grain": 1}
+    rows = [(f"P{i}", method, 2.0 * i % 5 + (method == "c")) for i in range(4) for method in "abc"]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "q"])
+    return summarise(design(factors={"method": {"levels": ["a", "b", "c"]}}, questions={"q": question}), table)
+
+
+@pytest.mark.parametrize(
+    ("p", "corrected", "said"),
+    [
+        (0.031, 0.072, "significant effect of method (not significant once corrected for sphericity), F(2, 6)"),
+        (0.031, 0.042, "ANOVA: significant effect of method, F(2, 6)"),
+        (0.051, 0.072, "ANOVA: no significant effect of method, F(2, 6)"),
+    ],
+)
+def test_an_effect_that_the_corrected_test_does_not_have_is_not_called_significant_without_a_word(p, corrected, said):
+    found = rated()
+    (question,) = found.questions.values()
+    anova = DesignTest(name="anova", effect="method", statistic=5.0, df=(2, 6), p=p, epsilon=0.6, p_gg=corrected)
+    changed = replace(found, questions={"q": replace(question, tests=(anova,))})
+    (told,) = result_sentences("test", changed)
+    assert said in told

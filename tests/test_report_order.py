@@ -10,6 +10,7 @@ import pytest
 from analysis.logs.exclusions import LeftOut
 from analysis.logs.reading import read_logs
 from analysis.paper.paper import ComparisonRow
+from analysis.stats.diagnostics import Corrected
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.experiments import effect_sentence
 from analysis.summary.sections.manuscript import manuscript_section
@@ -118,6 +119,22 @@ def test_an_F_of_two_people_is_not_printed_without_a_caution(tmp_path: Path) -> 
     found = report_of(write_study(tmp_path, participants=2)).statistics.preference
     assert found is not None
     assert "partial η² = .73. Two people are too few to say anything of others" in effect_sentence(found, "preference")
+
+
+def test_an_effect_that_the_corrected_test_does_not_have_is_told_with_its_corrected_p(tmp_path: Path) -> None:
+    """p and the corrected p on both sides of .05: who copies the sentence copies the warning."""
+    found = report_of(write_study(tmp_path, participants=3)).statistics.preference
+    assert found is not None
+    assert found.anova is not None
+    assert found.supplement is not None
+    assert "sphericity" not in effect_sentence(found, "preference", full=True)
+    corrected = Corrected(epsilon=0.6, df=(1.2, 2.4), p=0.072)
+    spherical = replace(found.supplement.sphericity, greenhouse_geisser=corrected)
+    changed = replace(
+        found, anova=replace(found.anova, p=0.031), supplement=replace(found.supplement, sphericity=spherical)
+    )
+    said = "on the rating (not significant once corrected for sphericity: Greenhouse–Geisser ε = .60, p = .072), F(2, 4)"
+    assert said in effect_sentence(changed, "preference")
 
 
 def test_who_was_left_out_stands_under_one_rule_with_the_remedy(tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ TWO_PEOPLE = (
     "test can be checked."
 )
 """Said behind an F of two."""
+NOT_CORRECTED = "not significant once corrected for sphericity"
+"""Said of an effect whose own p is below .05, but not the one that Greenhouse and Geisser's epsilon corrects."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.labels import display_name, named
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary
-from analysis.summary.sections.content import TWO_PEOPLE, ReportData
+from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData
 from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
@@ -150,10 +151,12 @@ def _is_none(test: DesignTest) -> bool:
 
 def _anova_words(test: DesignTest, *, exact: bool) -> str:
     size = "" if test.size is None else f", generalised η² = {apa.below_one(test.size)}"
-    effect = "significant effect" if test.p is not None and test.p < 0.05 else "no significant effect"
+    significant = test.p is not None and test.p < SIGNIFICANT
+    effect = "significant effect" if significant else "no significant effect"
+    lost = f" ({NOT_CORRECTED})" if significant and test.p_gg is not None and test.p_gg >= SIGNIFICANT else ""
     told = apa.f_test(test.statistic, test.df or (), test.p, exact=exact)
     corrected = f", {_sphericity(test, exact=exact)}" if test.p_gg is not None else ""
-    return f"{effect} of {effect_words(test.effect)}, {told}{size}{corrected}"
+    return f"{effect} of {effect_words(test.effect)}{lost}, {told}{size}{corrected}"
 
 
 def _sphericity(test: DesignTest, *, exact: bool = False) -> str:

@@ -14,7 +14,7 @@ from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
 from analysis.stats.paired import PairedT
 from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
-from analysis.summary.sections.content import TWO_PEOPLE, ReportData, has_many
+from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData, has_many
 from analysis.summary.sections.pictures import directions_picture
 
 
@@ -69,10 +69,19 @@ def effect_sentence(found: WithinStatistics, experiment: str, *, full: bool = Fa
         return f"{means} There were too few participants or methods for a test."
     if math.isnan(anova.p):
         return f"{means} Nothing differs: all scores are equal, so the {anova.name} has neither F nor p."
-    effect = "had a significant effect" if anova.p < 0.05 else "had no significant effect"
+    effect = "had a significant effect" if anova.p < SIGNIFICANT else "had no significant effect"
     test = f"{apa.f_test(anova.F, anova.df, anova.p, exact=full)}{_sizes(found, full=full)}"
     few = f" {TWO_PEOPLE}" if found.n == 2 else ""
-    return f"The rendering method {effect} on {printed.words}, {test}.{few} {means}"
+    return f"The rendering method {effect} on {printed.words}{_lost(found, full=full)}, {test}.{few} {means}"
+
+
+def _lost(found: WithinStatistics, *, full: bool) -> str:
+    """Of an effect that is significant without the correction for sphericity alone: the corrected p, in brackets."""
+    corrected = found.supplement.sphericity.greenhouse_geisser if found.supplement else None
+    if found.anova is None or corrected is None or not found.anova.p < SIGNIFICANT <= corrected.p:
+        return ""
+    told = f"Greenhouse–Geisser ε = {apa.below_one(corrected.epsilon)}, {apa.p_value(corrected.p, exact=full)}"
+    return f" ({NOT_CORRECTED}: {told})"
 
 
 def _means_words(found: WithinStatistics, printed: PrintedMeasure) -> str:
