@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from dataclasses import replace
@@ -291,6 +292,19 @@ def test_more_than_two_levels_within_people_have_the_p_that_does_not_take_spheri
     scores = rated.pivot_table(index="participant_id", columns="method", values="rating").to_numpy()
     anova = summarise(alone, rated).questions["rating"].tests[0]
     assert anova.p_gg == pytest.approx(sphericity(scores).greenhouse_geisser.p, rel=1e-6)
+
+
+def test_two_levels_have_nothing_to_correct_also_beside_three_groups():
+    groups = {"P1": "a", "P2": "a", "P3": "b", "P4": "b", "P5": "c", "P6": "c", "P7": "c"}
+    factors = {"hold": {"levels": ["a", "b", "c"], "between": True}, "method": {"levels": ["m"]}}
+    factors |= {"voltage_V": {"levels": [1.0, 2.0]}, "pulse_s": {"levels": [0.006, 0.01, 0.014]}}
+    random = np.random.default_rng(4)
+    cells = itertools.product(groups.items(), (1.0, 2.0), (0.006, 0.01, 0.014))
+    rows = [(person, group, "m", volts, pulse, random.normal(5, 1)) for (person, group), volts, pulse in cells]
+    table = pd.DataFrame(rows, columns=["participant_id", "hold", "method", "voltage_V", "pulse_s", "q"])
+    tests = summarise(design(factors=factors, questions=RATED), table).questions["q"].tests
+    corrected = {test.effect for test in tests if test.epsilon is not None}
+    assert {test.effect for test in tests} - corrected == {"hold", "voltage_V", "hold × voltage_V"}
 
 
 def test_a_test_whose_own_p_misleads_is_named_in_a_warning():

@@ -133,7 +133,9 @@ def test_an_effect_that_the_corrected_test_does_not_have_is_told_with_its_correc
     changed = replace(
         found, anova=replace(found.anova, p=0.031), supplement=replace(found.supplement, sphericity=spherical)
     )
-    said = "on the rating (not significant once corrected for sphericity: Greenhouse–Geisser ε = .60, p = .072), F(2, 4)"
+    said = (
+        "on the rating (not significant once corrected for sphericity: Greenhouse–Geisser ε = .60, p = .072), F(2, 4)"
+    )
     assert said in effect_sentence(changed, "preference")
 
 

@@ -85,6 +85,7 @@ def _factorial(names: Sequence[str], people: pd.DataFrame, group: pd.Series | No
         yield DesignTest(name="anova", effect=" × ".join(named), reason="a group has fewer than two people")
         return
     scores = people.to_numpy(dtype=np.float64).reshape(len(people), *_sizes(people))
+    free = len(people) - len(set(groups or [""]))
     for one in factorial_anova(scores, named, groups):
         test = DesignTest(
             name="anova",
@@ -95,12 +96,15 @@ def _factorial(names: Sequence[str], people: pd.DataFrame, group: pd.Series | No
             size=one.size,
             reason=one.reason or None,
         )
-        yield test if one.reason else _corrected(test, one)
+        yield test if one.reason else _corrected(test, one, free)
 
 
-def _corrected(test: DesignTest, effect: FactorialEffect) -> DesignTest:
-    """With the p that does not take sphericity, which two levels give for nothing."""
-    return replace(test, epsilon=effect.epsilon, p_gg=effect.p_gg) if effect.df[0] > 1 else test
+def _corrected(test: DesignTest, effect: FactorialEffect, free: int) -> DesignTest:
+    """With the p that does not take sphericity, which two levels give for nothing, of however many groups.
+
+    `free`: people less groups, the degrees of freedom that one contrast within people leaves for its error.
+    """
+    return replace(test, epsilon=effect.epsilon, p_gg=effect.p_gg) if effect.df[1] > free else test
 
 
 def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iterator[DesignTest]:
@@ -115,7 +119,8 @@ def _one_factor(name: str, scores: FloatArray, question: QuestionConfig) -> Iter
             size=effect_size(rm_anova(unit_scaled(scores))).generalized_eta_squared,
             reason=str(anova.reason) or None,
         )
-        yield test if anova.reason else _corrected(test, *factorial_anova(scores, [name]))
+        (effect,) = factorial_anova(scores, [name])
+        yield test if anova.reason else _corrected(test, effect, len(scores) - 1)
     if question.kind in {"rating", "ranking"}:
         yield _ranks_test(name, scores)
 
