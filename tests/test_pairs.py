@@ -13,8 +13,12 @@ from analysis.psychometric.paired import paired_scores
 from analysis.summary.designs import summarise
 from analysis.summary.figures.pairs import figure_pairs, has_scores
 from analysis.summary.pairs import PairedComparison, paired_comparison
+from analysis.summary.results import StudyStatistics
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.designs import result_sentences, sections_of_designs
 from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from experiments.design.config import DesignConfig
+from tests.designs import design
 from tests.tables_of_designs import loaded, simulated
 
 
@@ -93,3 +97,34 @@ def test_the_pages_have_scores_of_both_models_and_everybodys_circles(
     assert has_scores(of)
     figure_pairs(summary, of, tmp_path / "scores")
     assert (tmp_path / "scores.png").is_file()
+
+
+def test_that_a_tie_counts_as_half_a_choice_is_said_where_there_may_be_one(
+    config: DesignConfig, table: pd.DataFrame
+) -> None:
+    """The table of scores counts choices alone, and so has other shares."""
+    values = config.model_dump()
+    values["questions"]["rather"] |= {"answers": ("first", "second", "neither"), "keys": {}}
+    some = table["rather"].where(np.arange(len(table)) % 4 > 0, "neither")
+    for one, answers, said in (
+        (config, table, ""),
+        (DesignConfig.model_validate(values), table.assign(rather=some), ", a tie as half"),
+    ):
+        summary = summarise(one, answers)
+        (sentence,) = result_sentences("pairs", summary)
+        assert f": chosen, in the mean over people{said}, Vibration: " in sentence
+        (section, *_) = sections_of_designs(
+            ReportData(title="T", statistics=StudyStatistics(designs={"pairs": summary}))
+        )
+        assert section.tables[0].caption == f"rather: how often each was chosen{said}, by condition"
+
+
+def test_the_items_of_a_parameter_are_headed_by_its_name_and_unit() -> None:
+    asked = {"kind": "choice", "text": "?", "answers": ["first", "second"]}
+    factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [10.0, 13.0, 16.0]}}
+    volts = design(factors=factors, questions={"q": asked}, trial={"kind": "pair", "compare": "voltage_V"})
+    pairs = [(10.0, 13.0), (13.0, 16.0), (16.0, 10.0)]
+    rows = [(f"P{i}", "a", one, other, answer) for i, answer in enumerate(("first", "second")) for one, other in pairs]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "voltage_V_1", "voltage_V_2", "q"])
+    (section,) = pair_sections("test", summarise(volts, table))
+    assert section.tables[0].header[0] == "Voltage in V"

@@ -24,7 +24,11 @@ _STEP, _POLISHED = 1e-3, 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ItemScore(Result):
-    """An item's score, in logits (Bradley and Terry) or in units of sd √2 (Thurstone); the items' sum is 0."""
+    """An item's score, in logits (Bradley and Terry) or in units of sd √2 (Thurstone); the items' sum is 0.
+
+    `se`: the larger standard error of two, of independent answers and of the sandwich over people. `low, high`: the
+    wider of their two intervals, normal and Student's t, which need not be that of the larger error.
+    """
 
     item: Hashable
     score: float

@@ -110,9 +110,14 @@ def _mean_word(question: QuestionSummary) -> str:
     if any(cell.right is not None for cell in question.cells):
         return "hits" if question.detected else "right answers"
     if question.preferred:
-        return "chosen, in the mean over people"
+        return f"chosen, in the mean over people{_tie(question)}"
     words = {"number": "geometric means", "ranking": "mean ranks"}
     return f"share of {question.counted}" if question.counted else words.get(question.kind, "means")
+
+
+def _tie(question: QuestionSummary) -> str:
+    """How a third answer of a pair, a tie, counts for the two; empty where there is none."""
+    return ", a tie as half" if question.preferred and len(question.cells[0].answers or ()) > 2 else ""
 
 
 def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
@@ -314,7 +319,8 @@ def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
 
 def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Iterator[Table]:
     if question.preferred:
-        yield _conditions(found, f"{name}: how often each was chosen,", replace(question, cells=question.preferred))
+        often = f"{name}: how often each was chosen{_tie(question)},"
+        yield _conditions(found, often, replace(question, cells=question.preferred))
     if question.cells:
         named_scale = f"{name} ({question.scale})" if question.scale else name
         yield _conditions(found, named_scale, replace(question, preferred=None))

@@ -14,6 +14,7 @@ from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.pictures import pairs_figure_of
 from experiments.design.language import Level
+from experiments.design.methods_section import factor_words
 
 _TOLD = 6
 
@@ -113,10 +114,11 @@ def _tables(asked: str, found: DesignSummary, of: PairedComparison) -> Iterator[
 def _scores(caption: str, found: DesignSummary, of: PairedComparison, condition: PairCondition) -> Table:
     one, other = condition.scores
     thurstone = other.scores or (None,) * len(one.scores)
+    words = factor_words(of.factor)
     return Table(
         caption=caption,
         header=(
-            of.factor.capitalize(),
+            f"{words[:1].upper()}{words[1:]}",
             "Chosen",
             "Of",
             "Bradley–Terry",
