@@ -12,6 +12,7 @@ import pingouin
 import pytest
 from scipy import stats
 
+from analysis.report import apa
 from analysis.report.figures import style
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
@@ -313,3 +314,31 @@ def test_an_effect_that_the_corrected_test_does_not_have_is_not_called_significa
     changed = replace(found, questions={"q": replace(question, tests=(anova,))})
     (told,) = result_sentences("test", changed)
     assert said in told
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "interval"),
+    [
+        ({"kind": "choice", "answers": ["yes", "no"]}, " in percentage points", (100.0, 1)),
+        ({"kind": "number"}, " of natural logarithms", (1.0, 2)),
+        ({"kind": "rating", "minimum": 0, "maximum": 10, "grain": 1}, "", (1.0, 2)),
+    ],
+)
+def test_a_pair_is_called_by_its_levels_and_its_interval_has_a_unit(kind, unit, interval):
+    factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [10.0, 13.0, 16.0]}}
+    said = {"choice": ("yes", "no"), "number": (2.0, 5.0), "rating": (2.0, 5.0)}[kind["kind"]]
+    rows = [
+        (f"P{i}", "a", volts, said[(i * i + k * k) % 3 > 0])
+        for i in range(5)
+        for k, volts in enumerate((10.0, 13.0, 16.0))
+    ]
+    table = pd.DataFrame(rows, columns=["participant_id", "method", "voltage_V", "q"])
+    found = summarise(design(factors=factors, questions={"q": {"text": "?", **kind}}), table)
+    (test,) = [test for test in found.questions["q"].tests if test.effect == "13 – 10"]
+    tests = tables_of(found)[-1]
+    assert f"; intervals of pairs: the difference{unit}, 95 %, simultaneous" in tests.caption
+    (row,) = [row for row in tests.rows if row[1] == "13 V − 10 V"]
+    scale, digits = interval
+    assert row[5] == apa.interval(scale * test.ci_low, scale * test.ci_high, digits)
+    (sentence,) = result_sentences("test", found)
+    assert "Planned comparisons (Tukey's HSD): 13 V − 10 V, q = " in sentence

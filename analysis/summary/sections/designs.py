@@ -34,6 +34,8 @@ _TESTS = {
 """What a test is called, with the letter of its statistic."""
 _SENSITIVITY = frozenset(["d_prime", "criterion", "d_prime_mean"])
 _ESTIMATES = _SENSITIVITY | {"preferred"}
+_LESS, _MINUS = " – ", " − "
+"""Between the levels of a pair: in the file, and in print."""
 _TOLD = 6
 """So many conditions or pairs are told in a sentence; more are in the table."""
 
@@ -77,7 +79,7 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
     people = how_many(found.n, "synthetic participant" if found.origin.synthetic else "participant")
     for asked, question in found.questions.items():
         if question.cells:
-            tests = [*_tests_words(question, exact=exact)]
+            tests = [*_tests_words(found, question, exact=exact)]
             few = [TWO_PEOPLE] if found.n == 2 and tests else []
             fitted = [*threshold_sentences(found, question), *pair_sentences(found, question)]
             cells = [] if question.held and fitted else [_cells_words(found, question)]
@@ -128,7 +130,7 @@ def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
     return f"M = {_mean(question, cell)}{'' if cell.people < 2 else f', SD = {apa.number(cell.sd)}'}"
 
 
-def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
+def _tests_words(found: DesignSummary, question: QuestionSummary, *, exact: bool) -> Iterator[str]:
     planned = [test for test in question.tests if _standing(question, test) == "planned"]
     yield from (f"No test of {effect_words(test.effect)}: {test.reason}." for test in planned if _is_none(test))
     anovas = [_anova_words(test, exact=exact) for test in planned if test.name == "anova" and not _is_none(test)]
@@ -141,7 +143,7 @@ def _tests_words(question: QuestionSummary, *, exact: bool) -> Iterator[str]:
         yield f"Planned comparisons (Tukey's HSD): {below} of {len(pairs)} pairs differed at p < .05."
     elif pairs:
         told = "; ".join(
-            f"{effect_words(test.effect)}, q = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
+            f"{_pair(found, test.effect)}, q = {apa.number(test.statistic)}, {apa.p_value(test.p, exact=exact)}"
             for test in pairs
         )
         yield f"Planned comparisons (Tukey's HSD): {told}."
@@ -314,7 +316,7 @@ def _shown(cell: ConditionSummary) -> float | None:
 
 
 def _mean(question: QuestionSummary, cell: ConditionSummary) -> str:
-    return (apa.percent if question.kind in ("choice", "yes-no") else apa.number)(_shown(cell))
+    return (apa.percent if question.kind in _SHARES else apa.number)(_shown(cell))
 
 
 def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Iterator[Table]:
@@ -326,13 +328,21 @@ def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Itera
         yield _conditions(found, named_scale, replace(question, preferred=None))
     if question.tests:
         header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval", "Standing")
-        rows = tuple((*_test(found, test), _standing(question, test)) for test in question.tests)
+        rows = tuple((*_test(found, question, test), _standing(question, test)) for test in question.tests)
         note = f"; {_PLANNED}" if any(row[-1] == "planned" for row in rows) else ""
         note += f"; {_POOLED}" if any(test.name == "d_prime" for test in question.tests) else ""
         note += ", with the log-linear correction" if question.detected and _POOLED in note else ""
+        note += _of_pairs(question) if any(test.name == "tukey" for test in question.tests) else ""
         yield Table(caption=f"{name}: tests{note}", header=header, rows=rows)
 
 
+def _of_pairs(question: QuestionSummary) -> str:
+    """What the intervals of Tukey's test are of."""
+    units = {"number": " of natural logarithms"} | dict.fromkeys(_SHARES, " in percentage points")
+    return f"; intervals of pairs: the difference{units.get(question.kind, '')}, 95 %, simultaneous"
+
+
+_SHARES = ("choice", "yes-no")
 _SD_OF_SHARES = "SD [percentage points]"
 
 
@@ -369,18 +379,20 @@ def _level(found: DesignSummary, cell: ConditionSummary, factor: str) -> str:
 
 def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) -> tuple[str, ...]:
     if not scored:
-        shares = question.kind in ("choice", "yes-no") and cell.sd is not None
+        shares = question.kind in _SHARES and cell.sd is not None
         return (apa.number(100.0 * cell.sd, 1) if shares and cell.sd is not None else apa.number(cell.sd),)
     interval = f"{apa.percent(cell.ci_low)} to {apa.percent(cell.ci_high)}"
     return (interval, apa.p_cell(cell.p)) if question.chance is not None else (interval,)
 
 
-def _test(found: DesignSummary, test: DesignTest) -> tuple[str, ...]:
+def _test(found: DesignSummary, question: QuestionSummary, test: DesignTest) -> tuple[str, ...]:
     df = ", ".join(map(str, test.df)) if test.df else apa.NO_NUMBER
     if test.reason:
         more = test.reason
-    elif test.ci_low is not None:
-        more = apa.interval(test.ci_low, test.ci_high)
+    elif test.ci_low is not None and test.ci_high is not None:
+        points = test.name == "tukey" and question.kind in _SHARES
+        scale, digits = (100.0, 1) if points else (1.0, 2)
+        more = apa.interval(scale * test.ci_low, scale * test.ci_high, digits)
     elif test.kendall_w is not None:
         more = f"{_agreement(test)}, N = {test.n}"
     else:
@@ -404,5 +416,13 @@ def _effect(found: DesignSummary, test: DesignTest) -> str:
         return "all conditions"
     if test.name != "tukey":
         return ", ".join(_condition_part(found, part) for part in test.effect.split(", "))
-    labels = {level: label for of in found.labels.values() for level, label in of.items()}
-    return " – ".join(display_name(labels.get(level, level)) for level in test.effect.split(" – "))
+    return _pair(found, test.effect)
+
+
+def _pair(found: DesignSummary, effect: str) -> str:
+    """Both levels of a pair, of the one factor that varies within people, by what they are called."""
+    for name, levels in found.factors.items():
+        shown = {shown_level(level): level for level in levels}
+        if len(levels) > 1 and {*effect.split(_LESS)} <= {*shown}:
+            return _MINUS.join(display_name(found.label(name, shown[level])) for level in effect.split(_LESS))
+    return effect_words(effect)
