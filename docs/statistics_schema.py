@@ -18,9 +18,10 @@ NUMBER = {"type": ["number", "null"]}
 """A number that is not finite is written as null."""
 HEAD = """# statistics.json
 
-What `recoil analyze` writes for programs. Nothing is rounded; rates are 0 to 1, times in s, SDs with n − 1. A number
-that is not defined is `null`, and a line of `warnings` or a `reason` beside it says why. A key that may be missing is
-marked. The same as a file: {download}`statistics.schema.json <statistics.schema.json>` (JSON Schema, draft 2020-12).
+What `recoil analyze` writes for programs. Nothing is rounded; rates are 0 to 1, times in s, SDs with n − 1. p of t, z,
+signed-rank and binomial tests are two-sided unless it is said otherwise. A number that is not defined is `null`, and a
+line of `warnings` or a `reason` beside it says why. A key that may be missing is marked. The same as a file:
+{download}`statistics.schema.json <statistics.schema.json>` (JSON Schema, draft 2020-12).
 Every `statistics.json` that these pages make is held against it.
 
 A design other than `direction` and `preference` stands under its own name, as a `DesignSummary`.

@@ -18,8 +18,8 @@ from analysis.stats.frames import Label, Result, Results, ScoreTable, named_scor
 METHOD = (
     "Clustering: the intraclass correlation is the analysis-of-variance estimate for binary answers (Ridout, Demétrio "
     "& Firth 1999); the design effect is 1 + (sum m² / sum m − 1) times it, over participants with m trials; the "
-    "adjusted p is that of the rate with its variance times the design effect, or times 1 if that is larger (Rao & "
-    "Scott 1992), on t(participants − 1)."
+    "adjusted p is that of the rate against chance, with its variance at chance times the design effect, or times 1 if "
+    "that is larger (Rao & Scott 1992), two-sided on t(participants − 1)."
 )
 ONE_PERSON = "There are fewer than two participants: nothing tells the spread between people from chance."
 ONE_TRIAL = "Nobody has two trials: nothing tells the spread between people from chance."

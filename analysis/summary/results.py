@@ -242,7 +242,7 @@ class Scores:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledBinomial:
-    """The exact binomial test of all participants' answers against guessing, and how they cluster in people.
+    """The exact two-sided binomial test of all participants' answers against guessing; how they cluster in people.
 
     `fewest_and_most` trials of a participant, where not everybody has as many.
     """

@@ -141,7 +141,10 @@ def _analysis(found: WithinStatistics) -> str:
         "mean difference over the SD of the differences."
     )
     if isinstance(found, DirectionStatistics) and found.binomial:
-        told += " Correct rates were tested against 50 % by exact binomial tests over the trials of all participants."
+        told += (
+            " Correct rates were tested against 50 % by two-sided exact binomial tests over the trials of all "
+            "participants."
+        )
     return told
 
 
