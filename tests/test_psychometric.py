@@ -167,3 +167,11 @@ def test_catch_trials_tell_the_guess_rate() -> None:
     assert told.reason is None
     with pytest.raises(ValueError, match=r"catch must be two whole numbers, .*, not \(5, 4\)"):
         psychometric_fit(LEVELS, RIGHT, TRIALS, guess=None, catch=(5, 4))
+
+
+def test_many_catch_trials_leave_the_guess_rate_where_they_have_it() -> None:
+    """A tenth of 240; the numbers by two million draws from the priors, weighted by the likelihood."""
+    found = psychometric_fit([3.0, 4.0, 5.0, 6.0], [6, 20, 35, 38], [40] * 4, guess=None, catch=(24, 240))
+    assert found.guess.median == pytest.approx(0.0975, abs=0.002)
+    assert (found.guess.low, found.guess.high) == pytest.approx((0.0657, 0.1372), abs=0.004)
+    assert found.threshold.median == pytest.approx(4.0587, abs=0.005)
