@@ -247,6 +247,18 @@ def test_the_pages_have_groups_differences_people_and_a_panel_each(
     assert (tmp_path / "functions.png").is_file()
 
 
+def test_a_mean_says_of_how_many_people_it_is_where_some_were_not_fitted(
+    config: DesignConfig, of_two: pd.DataFrame
+) -> None:
+    """Who broke off after five trials has no function, and is one of the participants that the sentence begins with."""
+    third = of_two[of_two["participant_id"] == "A"].groupby("method").head(5).assign(participant_id="C")
+    summary = summarise(config, pd.concat([of_two, third]))
+    (sentence,) = threshold_sentences(summary, summary.questions["response"])
+    assert sentence.count(" (of 2 of 3 people)") == 2
+    whole = summarise(config, of_two)
+    assert "people)" not in next(threshold_sentences(whole, whole.questions["response"]))
+
+
 @pytest.mark.parametrize("people", [1, 4, 6])
 @pytest.mark.parametrize("methods", [1, 2])
 def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(

@@ -54,7 +54,8 @@ def _group_words(one: ConditionFit, digits: int | None) -> str:
     if not _has_threshold(one):
         return "nobody has one within the levels"
     jnd = _number(one.group.jnd.median, digits)
-    return f"{_number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}"
+    some = f" (of {one.group.people} of {len(one.people)} people)" if one.group.people < len(one.people) else ""
+    return f"{_number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}{some}"
 
 
 def _has_threshold(one: ConditionFit) -> bool:
