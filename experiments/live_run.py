@@ -22,7 +22,7 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import Halted, Remark, remark_kind, remark_record
+from experiments.session.remarks import EntryCorrected, Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Outcome, Session, Step, step_after, step_record
 
@@ -32,6 +32,7 @@ HALT_UNSAVED = (
     "The emergency stop is not on record: free the disk before you close the run. Else it begins without a test shot "
     "when it is resumed."
 )
+CORRECTION_UNSAVED = "a correction could not be saved: enter it anew (undo) when the run goes on"
 
 
 class RunStopped(RecoilError):  # noqa: N818 - a stop is not an error
@@ -338,12 +339,22 @@ class LiveRun:
             self._screen.acknowledge(None, remark)
             return
         text = getattr(remark, "text", "")
-        halt = isinstance(remark, Halted) and not isinstance(error, JournalGone)  # it is where the journal is now
+        gone = isinstance(error, JournalGone)  # it is where the journal is now
+        halt = isinstance(remark, Halted) and not gone
         self.halt_unsaved = self.halt_unsaved or halt
         lost = HALT_UNSAVED if halt else f"Not saved: “{text}”" if text else ""
+        if not gone:
+            self._take_back(remark)
         self._screen.trouble(f"{error}. {lost}" if lost else str(error))
-        if isinstance(error, JournalGone):
+        if gone:
             self.offer(events.ResultsGone(cause=str(error)))
+        elif isinstance(remark, EntryCorrected):  # what comes next may follow from it, and would from nothing on record
+            self.offer(events.ResultsGone(cause=CORRECTION_UNSAVED))
+
+    def _take_back(self, remark: Remark) -> None:
+        """Show nothing that the disk refused. The session has read it: a run that goes by it ends."""
+        with self.news:
+            self._history = [entry for entry in self._history if entry[1] is not remark]
 
     # the run's side
 

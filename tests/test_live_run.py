@@ -13,7 +13,7 @@ import pytest
 
 from device import LimitError, LinkError
 from experiments.design.plan import Trial
-from experiments.live_run import EventVerdict, RunStopped
+from experiments.live_run import CORRECTION_UNSAVED, EventVerdict, RunStopped
 from experiments.record import storage
 from experiments.record.journal import JournalError
 from experiments.record.replay import history
@@ -22,6 +22,7 @@ from experiments.screens.texts import again_text
 from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
+from experiments.session.history import entered_value
 from experiments.session.remarks import (
     EntryCorrected,
     Flagged,
@@ -1242,3 +1243,36 @@ def test_a_note_that_cannot_be_written_is_given_back_in_words(tmp_path: Path, mo
             wait_for(lambda: sitting.window.troubles, "it is not said")
         assert "No space left" in sitting.window.troubles[0]
         assert "the dog barked" in sitting.window.troubles[0]
+
+
+@pytest.mark.parametrize("halted", [False, True])
+def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_from_it(
+    halted: bool, tmp_path: Path
+) -> None:
+    with sat(DIRECTION, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
+
+        def full_once(descriptor: int) -> None:
+            disk.undo()
+            full(descriptor)
+
+        sitting.to(S.ASKING)
+        assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
+        sitting.to(S.PREPARING)
+        if halted:
+            assert sitting.live.offer(events.EmergencyStop())
+            sitting.settle()
+        assert by_hand(sitting, events.Undo())
+        entry = sitting.position.correcting
+        assert entry is not None
+        disk.setattr(storage, "sync", full_once)
+        assert sitting.live.offer(events.Correct(value="backward"))
+        wait_for(lambda: sitting.window.troubles, "it is not said")
+        wait_for(lambda: halted or sitting.position.state is S.STOPPED, "the run goes on")
+        assert entered_value(sitting.live.history, entry) == "forward"
+        if halted:
+            assert sitting.position.base is S.HALTED
+            assert by_hand(sitting, events.Undo())
+            assert by_hand(sitting, events.Correct(value="backward"))
+        contents = of_journal(sitting)
+    assert [one.value for one in remarks(contents, EntryCorrected)] == ["backward"] * halted
+    assert contents.records[-1].reason == (EMERGENCY if halted else CORRECTION_UNSAVED)

@@ -256,7 +256,7 @@ class DisplayLost(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultsGone(Event):
-    """The journal is not where it was."""
+    """The journal is not where it was, or has not taken what the run goes by."""
 
     cause: str
 
