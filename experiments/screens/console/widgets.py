@@ -260,6 +260,14 @@ class LineEdit(QtWidgets.QLineEdit):
         return QSize(40, super().minimumSizeHint().height())
 
 
+class ReasonLine(LineEdit):
+    """A line for the reason of an answer. Enter stays in it: behind it are buttons, which a typed blank would press."""
+
+    def focusNextChild(self) -> bool:  # noqa: N802 - Qt's name
+        """Go nowhere."""
+        return False
+
+
 WHY = phrase("why? (never a name)")
 
 
@@ -280,7 +288,7 @@ class QuestionBox(QtWidgets.QFrame):
         self.setObjectName("panel")
         self.text = TextLines("question")
         self.text.say(text, "ask")
-        self.reason = LineEdit()
+        self.reason = ReasonLine()
         self.reason.setMaxLength(MAX_REASON)
         self.reason.setPlaceholderText(reason)
         self.reason.setAccessibleName(reason)
