@@ -24,7 +24,7 @@ from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
 from experiments.session.remarks import EntryCorrected, Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
-from experiments.session.steps import Outcome, Session, Step, step_after, step_record
+from experiments.session.steps import Interrupted, Outcome, Session, Step, step_after, step_record
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
@@ -297,6 +297,10 @@ class LiveRun:
         with self.news:
             self._history.append((step, outcome))
         self._screen.acknowledge(step, outcome)
+
+    def give_up(self, *, felt: bool) -> None:
+        """Have on the disk what was felt of a stimulus at which the run ends."""
+        self.journal.append("outcome", body=step_record(Interrupted(presented=felt)))
 
     def go_on(self, session: Session, outcome: Outcome) -> Step | None:
         """The session's next step, which the journal has when this returns; `None` at its end.

@@ -403,8 +403,7 @@ class DeskGun:
                 self._live.sleep(not_before_s)
             self._arm()
         except RunStopped:
-            felt = isinstance(step, steps.FireShot) and step.interval > 0
-            self._live.journal.append("outcome", body=steps.step_record(steps.Interrupted(presented=felt)))
+            self._live.give_up(felt=isinstance(step, steps.FireShot) and step.interval > 0)
             raise
 
     def _arm(self) -> None:
@@ -423,8 +422,17 @@ class DeskGun:
         return self._desk.stimuli.first_shot((trial, *self._live.plan.trials))
 
     def _failed(self, error: DeviceError, *, felt: bool) -> steps.Failed | steps.Interrupted:
-        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
-        if isinstance(self._live.taken(), events.Pause | events.ParticipantLost):
+        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's.
+
+        If the run has ended meanwhile, it is on the disk that nothing was felt, where that is so.
+        """
+        try:
+            meanwhile = self._live.taken()
+        except RunStopped:
+            if not felt:
+                self._live.give_up(felt=False)
+            raise
+        if isinstance(meanwhile, events.Pause | events.ParticipantLost):
             return steps.Interrupted(presented=felt, cause="pause")
         lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
         self._live.offer(lost(cause=str(error)))

@@ -873,6 +873,27 @@ def test_a_disarming_that_is_slow_does_not_disarm_the_next_shot(
         assert said.index(("disarmed", True)) < said.index(("arm", False)) < said.index(("rendered", False))
 
 
+@pytest.mark.parametrize("end", [events.Stop(reason="lunch"), events.EmergencyStop()], ids=["stop", "emergency stop"])
+def test_a_stop_while_the_gun_cannot_be_armed_is_no_attempt(end: Event, tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        arm = sitting.gun.arm
+
+        def arm_in_vain() -> None:
+            arm()
+            raise LinkError("the line is gone")
+
+        sitting.to(S.PREPARING)
+        sitting.gun.hang = "arm"
+        sitting.gun.arm = arm_in_vain
+        sitting.press("Space")
+        assert sitting.live.offer(end)
+        sitting.gun.release()
+        of_journal(sitting)
+        with sat(DIRECTION, tmp_path, resumed=True) as again:
+            _, rows = to_the_end(again)
+    assert rows[0]["attempts"] == "1"
+
+
 def test_next_said_while_a_shot_fails_leaves_a_fault_of_the_gun_and_no_pause(tmp_path: Path) -> None:
     with sat_at(S.TRAIN, tmp_path) as sitting:
         sitting.gun.hang = "fire"
