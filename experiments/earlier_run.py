@@ -64,8 +64,8 @@ def earlier_run(where: Place, request: RunRequest) -> EarlierRun:
         if request.again == "ask":
             raise UnfinishedRun(where, contents)
         return EarlierRun(before=contents)
-    if contents is not None and contents.head.participant == "person" and (count := answers_in(contents)):
-        _refuse_unsaid(request, f"{where.journal}: has answers: {count}")
+    if contents is not None and contents.head.participant == "person" and (said := _said_in(where, contents)):
+        _refuse_unsaid(request, said)
     return EarlierRun(gives_way=True, reason=request.anew_reason, size_bytes=size_bytes)
 
 
@@ -91,6 +91,15 @@ def _refuse_unsaid(request: RunRequest, what: str) -> None:
     """`PlaceError`: what may be a person's answers is set aside, and nobody says why."""
     if not (request.practice or request.anew_reason):
         raise PlaceError(f"{what}; --fresh sets them aside, so say why with --reason TEXT")
+
+
+def _said_in(where: Place, contents: Contents) -> str:
+    """How many answers a run has, or why nobody can say; empty if it has none."""
+    try:
+        count = answers_in(contents)
+    except JournalError as error:
+        return str(error)
+    return f"{where.journal}: has answers: {count}" if count else ""
 
 
 def _size_of_held(where: Place) -> int:

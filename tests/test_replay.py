@@ -17,6 +17,7 @@ from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
+from experiments.earlier_run import earlier_run
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.record.replay import go_on, history, replay
@@ -430,6 +431,22 @@ def test_what_cannot_be_read_is_set_aside_for_a_reason_alone(unbroken: dict[str,
     with pytest.raises(PlaceError, match=r"--fresh sets them aside, so say why with --reason TEXT"):
         run(request("preference", tmp_path, "fresh"), synthetic_screen, VirtualClock())
     assert journal.read_bytes() == spoilt
+
+
+def test_what_another_version_wrote_is_set_aside_for_a_reason_alone(
+    unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    journal = broken_off(unbroken["preference"], tmp_path, 6)
+    records = raw(journal)
+    step = next(record for record in records if record["kind"] == "step")
+    step["body"]["kind"] = "newer"
+    records[0]["participant"] = "person"
+    journal.write_bytes(forged(records))
+    asked = request("preference", tmp_path, "fresh")
+    with pytest.raises(PlaceError, match=rf"line {step['n'] + 1}: Input tag 'newer' .*; --fresh sets them aside"):
+        earlier_run(place(tmp_path, "P01", "preference"), asked)
+    earlier = earlier_run(place(tmp_path, "P01", "preference"), replace(asked, anew_reason="another version"))
+    assert (earlier.gives_way, earlier.reason) == (True, "another version")
 
 
 @pytest.mark.parametrize("again", ["resume", "fresh", "ask"])

@@ -437,8 +437,8 @@ def read_as(kind: TypeAdapter[Typed], value: object, place: str) -> Typed:
         return kind.validate_python(value)
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise JournalError(f"{place}: {where}: {first['msg']}; the record was changed") from error
+        said = filter(None, (place, ".".join(str(part) for part in first["loc"]), first["msg"]))
+        raise JournalError(f"{': '.join(said)}; the record was changed") from error
 
 
 def _values(path: Path, number: int, line: bytes, before: str) -> dict[str, object]:
