@@ -39,7 +39,7 @@ class Train:
     def __init__(self, step: steps.Present, desk: Desk) -> None:
         self._step, self._desk, self._live = step, desk, desk.live
         self._onset_utc, self._onset_s = "", math.nan
-        self.shots = 0
+        self.shots = self._tick = 0
 
     def began(self, onset_utc: str, first: ShotReport) -> None:
         """Take the first shot; `next` counts after the least exposure."""
@@ -63,7 +63,10 @@ class Train:
 
     def due_s(self) -> float:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
-        tick_s = self._onset_s + self.shots * round(self._step.repeat_every_s * 1e6) / 1e6
+        # what went by while this machine stood still is left out: made up for, it would be fired faster than planned
+        gone_by = int((self._live.clock.now() - self._onset_s) / self._step.repeat_every_s)
+        self._tick = gone_by + 1 if gone_by > self._tick + 1 else self._tick + 1
+        tick_s = self._onset_s + self._tick * round(self._step.repeat_every_s * 1e6) / 1e6
         return max(tick_s, self._live.gun.status().ready_at_s)
 
     def presented(self, ended_by: Literal["next", "limit"]) -> steps.Presented:
@@ -422,14 +425,11 @@ class DeskGun:
         return self._desk.stimuli.first_shot((trial, *self._live.plan.trials))
 
     def _failed(self, error: DeviceError, *, felt: bool) -> steps.Failed | steps.Interrupted:
-        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's.
-
-        If the run has ended meanwhile, it is on the disk that nothing was felt, where that is so.
-        """
+        """What became of a stimulus at which the gun failed; a pause that disarmed it is no fault of the gun's."""
         try:
             meanwhile = self._live.taken()
         except RunStopped:
-            if not felt:
+            if not felt:  # where it may have been, that is what a resumed run takes it for
                 self._live.give_up(felt=False)
             raise
         if isinstance(meanwhile, events.Pause | events.ParticipantLost):
