@@ -197,6 +197,21 @@ def test_a_signal_ends_the_question_of_an_unfinished_run(pilot: Path, display: s
     assert (pilot / LONG / "sub-P01" / "sub-P01_task-direction_journal.jsonl").read_bytes() == before
 
 
+@needs_manager
+def test_the_question_of_an_unfinished_run_is_no_wider_than_the_screen(
+    pilot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("QT_SCALE_FACTOR", "1.5")
+    command = ["run", pilot / "pilot" / "direction.toml", "--screen", "console", "--participant", "P01"]
+    with (
+        virtual_screen("1024x768", manager=True) as display,
+        AtDisplay([*command, "--results", LONG], pilot, display) as screen,
+    ):
+        left, _, width, _ = screen.focus_on("unfinished")
+    assert left >= 0
+    assert left + width <= 1024
+
+
 def test_a_signal_in_a_test_shot_disarms_and_ends_it(pilot: Path, display: str) -> None:
     with started(pilot, display) as (screen, eye):
         wait_for(eye, having("Next: P01"))

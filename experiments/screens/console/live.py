@@ -212,6 +212,10 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
     )
 
 
+_FRAME = 16
+"""What a window manager puts around a window, in pixels, and a little more."""
+
+
 class Unfinished(QDialog):
     """Go on with a run, set it aside for a reason, or leave it. `decided` is the request with the decision, if any.
 
@@ -232,7 +236,8 @@ class Unfinished(QDialog):
         self.question = QuestionBox(_text(found), answers, reason=phrase("to start anew: {why}", why=WHY))
         self.said = TextLines("saved")
         widgets.fill(QVBoxLayout(self), self.question, self.said, margins=None)
-        self.setMinimumWidth(720)
+        screen = self.screen()
+        self.setMinimumWidth(720 if screen is None else min(720, screen.availableGeometry().width() - _FRAME))
         for button in self.findChildren(QPushButton):
             button.setAutoDefault(False)
 
