@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -37,10 +38,14 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[warm_start.FOLDER] = tempfile.mkdtemp(prefix="recoil-tests-")
 
 
+_MANY = 10
+"""From so many slow tests on a module is as long as any."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The modules with slow tests come first, those that wait mixed with those that compute; the quick ones fill up."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: (item.path not in slow, zlib.crc32(item.path.name.encode())))
+    """The modules with most slow tests come first, those that wait mixed with those that compute; the quick fill up."""
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: (-min(slow[item.path], _MANY), zlib.crc32(item.path.name.encode())))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

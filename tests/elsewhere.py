@@ -1,7 +1,8 @@
 """This system with what another one lacks taken away, to see what is left: `python -m tests.elsewhere win32 WORDS`.
 
-The words are a command of `recoil`; `import` alone imports every module instead. Libraries are imported before, as they
-know the system that they were made for: what is seen is our own code alone. No real Windows and no real Mac is like it.
+The words are a command of `recoil`, or several with `then` between them, of which the first that fails is the last;
+`import` alone imports every module instead. Libraries are imported before, as they know the system that they were made
+for: what is seen is our own code alone. No real Windows and no real Mac is like it.
 """
 
 from __future__ import annotations
@@ -72,11 +73,13 @@ def be(system: str) -> None:
 
 
 def import_all() -> None:
-    """Import every module of ours, and say which cannot be."""
+    """Import every module of ours, and say which cannot be, and how many there are."""
+    count = 0
     for top in ("device", "experiments", "analysis", "recoil"):
-        for found in pkgutil.walk_packages([top], f"{top}."):
+        for found in pkgutil.walk_packages(importlib.import_module(top).__path__, f"{top}."):
             if found.name.endswith("__main__") or "doctor.programs." in found.name:
                 continue
+            count += 1
             try:
                 importlib.import_module(found.name)
             except ModuleNotFoundError as error:
@@ -84,17 +87,26 @@ def import_all() -> None:
                     sys.stdout.write(f"{found.name}: {error}\n")
             except Exception as error:  # noqa: BLE001 - whatever it is, it is told
                 sys.stdout.write(f"{found.name}: {type(error).__name__}: {error}\n")
+    sys.stdout.write(f"{count} modules\n")
 
 
 def main() -> None:
     be(sys.argv[1])
-    sys.argv[1:] = sys.argv[2:]
-    if sys.argv[1:] == ["import"]:
+    words = sys.argv[2:]
+    if words == ["import"]:
         import_all()
         return
     from recoil.cli import main as recoil
 
-    sys.argv[0] = "recoil"
+    while "then" in words:
+        sys.argv[:] = ["recoil", *words[: words.index("then")]]
+        del words[: words.index("then") + 1]
+        try:
+            recoil()
+        except SystemExit as ended:
+            if ended.code:
+                raise
+    sys.argv[:] = ["recoil", *words]
     recoil()
 
 

@@ -48,6 +48,7 @@ def undone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Contents]
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_after_corrections_and_repeats_the_next_level_is_as_if_the_answers_had_been_given_at_once(
     kind: str, undone: dict[str, list[Contents]]
@@ -55,6 +56,7 @@ def test_after_corrections_and_repeats_the_next_level_is_as_if_the_answers_had_b
     assert sum(check_levels(SETUPS[kind], contents) for contents in undone[kind]) > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_row_has_an_answer_to_another_stimulus_than_its_own_whenever_a_run_stops(
     kind: str, undone: dict[str, list[Contents]]
@@ -70,6 +72,7 @@ def test_a_run_ends_when_every_track_is_over_by_the_answers_as_they_count_in_the
         check_ends(SETUPS[kind], contents)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_run_that_is_cut_off_anywhere_stands_where_the_unbroken_one_stood(
     kind: str, undone: dict[str, list[Contents]]
@@ -84,6 +87,7 @@ def test_a_run_that_is_cut_off_anywhere_stands_where_the_unbroken_one_stood(
             assert step_record(step) == step_record(wanted)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_run_that_was_cut_off_and_goes_on_chooses_by_the_answers_that_count(
     kind: str, undone: dict[str, list[Contents]], tmp_path: Path
@@ -115,6 +119,7 @@ def test_a_run_that_is_killed_and_resumed_feels_what_the_unbroken_one_felt(tmp_p
     assert rows == unbroken("pairs", tmp_path / "unbroken")
 
 
+@pytest.mark.slow
 def test_logs_of_another_procedure_are_left_out_as_their_levels_rest_on_other_priors(tmp_path: Path) -> None:
     for place, kind in enumerate(("posterior", "posterior", "posterior-ends"), start=1):
         request = replace(_request(SETUPS[kind], tmp_path), participant_id=f"P0{place}")

@@ -127,16 +127,19 @@ def _compare_p_and_interval(pair: Comparison, row: Entry, relative: float, df: i
     assert (pair.ci_low, pair.ci_high) == _near((row["ci_low"], row["ci_high"]), relative, slack)
 
 
+@pytest.mark.slow
 @_both("within", "tukey_hsd")
 def test_the_pooled_Tukey_test_is_TukeyHSD_of_participants_and_conditions(data: Entry, found: Entry) -> None:
     _compare_pairs(rm_tukey_hsd(data["scores"]), found["tukey_hsd"], data, found["aov"]["df_error"])
 
 
+@pytest.mark.slow
 @_both("within", "emmeans_univariate")
 def test_the_pooled_Tukey_test_is_emmeans_on_the_univariate_model(data: Entry, found: Entry) -> None:
     _compare_pairs(rm_tukey_hsd(data["scores"]), found["emmeans_univariate"], data, found["aov"]["df_error"])
 
 
+@pytest.mark.slow
 @_both("within", "emmeans_multivariate")
 def test_the_paired_Tukey_test_is_emmeans_on_the_multivariate_model(data: Entry, found: Entry) -> None:
     scores = data["scores"]
@@ -175,6 +178,7 @@ def test_Mauchlys_test_and_both_epsilons_are_those_of_car(data: Entry, found: En
     assert ours.huynh_feldt.p == _near(theirs["hf_p"], 10 * relative)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correction", ["greenhouse_geisser", "huynh_feldt"])
 @_both("within", "car_sphericity")
 def test_afex_corrects_the_degrees_of_freedom_and_p_as_we_do(data: Entry, found: Entry, correction: str) -> None:

@@ -30,6 +30,7 @@ def prior(log_g, scale):
     return stats.invgamma.pdf(math.exp(log_g), 0.5, scale=scale**2 / 2) * math.exp(log_g)
 
 
+@pytest.mark.slow
 def test_within_people_it_is_the_integral_of_the_whole_model():
     n, k = SCORES.shape
     who, what = (part.ravel() for part in np.indices((n, k)))

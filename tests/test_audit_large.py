@@ -19,6 +19,7 @@ from experiments.config.door import ConfigError, checked_table
 MANY = 1_000_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "chance"), [(997, "1/2"), (1_501, "1/2"), (MANY, "1/2"), (MANY, "1/3"), (3_001, "0.07")])
 def test_the_nearest_p_are_those_of_the_exact_test(n: int, chance: str) -> None:
     """`binomial_test` sums in long doubles, to 13 digits."""
@@ -39,6 +40,7 @@ def test_the_counts_of_a_million_that_give_a_p_are_found() -> None:
     assert [0.205 <= one < 0.206 for one in p] == [False, True, True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("result", "verdict"),
     [

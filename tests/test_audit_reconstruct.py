@@ -37,6 +37,7 @@ def paper() -> Paper:
     return load_paper(Path(__file__).parent.parent / "configs" / "paper.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k", "with_sds"), DESIGNS)
 def test_samples_that_existed_are_found_again(k: int, with_sds: bool) -> None:
     """Twelve a design here; `make soak` takes a thousand, and their times."""

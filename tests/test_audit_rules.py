@@ -59,6 +59,7 @@ def test_a_printed_number_stands_for_what_prints_so(text: str, rounding: Roundin
     assert not interval.holds(Fraction(outside))
 
 
+@pytest.mark.slow
 @given(st.fractions(min_value=-9, max_value=9, max_denominator=999), st.integers(0, 3))
 def test_the_mixed_interval_holds_what_any_rounding_prints(value: Fraction, digits: int) -> None:
     cut = int(value * 10**digits)

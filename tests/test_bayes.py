@@ -20,6 +20,7 @@ def _by_effect_size(t: float, n: int, r: float) -> float:
     return total / float(stats.t.pdf(t, n - 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("t", "n"), [(2.0, 14), (4.0, 14), (3.5, 20), (1.0, 30)])
 def test_the_factor_is_the_average_likelihood_over_effect_sizes(t: float, n: int) -> None:
     assert jzs_paired(t, n) == pytest.approx(_by_effect_size(t, n, SCALE), rel=0.03)  # the tails of the prior are cut

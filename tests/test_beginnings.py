@@ -251,6 +251,7 @@ def test_a_practice_of_an_experiment_that_has_none_is_refused_before_anything_is
     assert not register.read_register(study.results).entries
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("practice", [False, True])
 def test_a_run_that_is_open_elsewhere_is_neither_gone_on_with_nor_practised_for(
     practice: bool, study: StudyFolder

@@ -21,6 +21,7 @@ def test_canonical_json_is_json_of_the_same_value(value: object) -> None:
     assert json.loads(canonical_json(value)) == value
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.dictionaries(words, scalars, max_size=6), st.randoms(use_true_random=False))
 def test_the_order_of_keys_does_not_matter(table: dict[str, object], random: object) -> None:

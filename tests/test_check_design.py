@@ -123,6 +123,7 @@ def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_
     assert "asymmetric-2/backward" in backward
 
 
+@pytest.mark.slow
 def test_a_key_that_begins_a_word_of_another_answer_is_a_warning(tmp_path):
     keys = 'answers = ["forward", "backward"]'
     alike = 'labels = { forward = "a kick", backward = "a knock" }'

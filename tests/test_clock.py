@@ -86,6 +86,7 @@ def test_a_virtual_clock_goes_on_after_the_run_that_stopped_ahead_of_it() -> Non
     assert clock.utc() == "2999-01-02T03:04:05.000006Z"
 
 
+@pytest.mark.slow
 def test_a_signal_that_another_thread_takes_wakes_who_waits_for_news():
     news, clock = threading.Condition(), RealClock()
     end_s = clock.now() + PATIENCE_S

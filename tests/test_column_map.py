@@ -128,6 +128,7 @@ NO_NUMBERS = ["5_04", "nan", "NaN", "inf", "1e999", "٥"]
 """What Python reads as a number and no log means by one."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["s", "ms"])
 @pytest.mark.parametrize("cell", NO_NUMBERS)
 def test_a_time_that_python_alone_reads_as_a_number_is_refused(tmp_path: Path, cell: str, unit: str) -> None:
@@ -139,6 +140,7 @@ def test_a_time_that_python_alone_reads_as_a_number_is_refused(tmp_path: Path, c
     assert problem.line == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", ["", "[rating]\nscale_min = 1\nscale_max = 7"])
 @pytest.mark.parametrize("cell", NO_NUMBERS)
 def test_a_rating_that_python_alone_reads_as_a_number_is_refused(tmp_path: Path, cell: str, scale: str) -> None:
@@ -173,6 +175,7 @@ scale_max = 7
     assert "line 2, column slider: rating 8 is out of range (rule: 1 to 7" in str(logs.problems[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "kept"), [("scale_min = 1\nscale_max = 7", False), ("", True)])
 def test_of_ratings_of_another_program_no_question_and_no_anchors_are_invented(
     tmp_path: Path, scale: str, kept: bool

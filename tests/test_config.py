@@ -121,6 +121,7 @@ def test_leaves_are_the_dotted_keys_of_tables_and_values() -> None:
     assert len(keys) == len(set(keys))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 24))
 def test_a_design_is_taken_exactly_if_its_trials_fill_its_sets(sets: int, repetitions: int) -> None:

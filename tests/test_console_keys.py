@@ -67,6 +67,7 @@ def test_a_number_is_typed_at_a_rating_words_at_a_description_and_nothing_elsewh
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", [False, True])
 @pytest.mark.parametrize("ctrl", [False, True])
 @pytest.mark.parametrize("position", POSITIONS, ids=lambda position: position.state)
@@ -201,6 +202,7 @@ HANDS = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(hands=HANDS)
 def test_however_long_a_key_is_held_and_however_that_is_told_a_press_acts_once(
     hands: list[tuple[str, int, How]],
@@ -283,6 +285,7 @@ def test_a_release_without_a_press_is_none() -> None:
 DELAYS = st.lists(st.tuples(st.integers(0, 60_000), st.integers(0, 1_900)), min_size=1, max_size=30)
 
 
+@pytest.mark.slow
 @given(zero_s=st.integers(-4_000_000, 4_000_000), presses=DELAYS)
 def test_a_press_is_never_dated_before_it_was_nor_after_it_was_seen(
     zero_s: int, presses: list[tuple[int, int]]

@@ -114,6 +114,7 @@ def test_a_method_is_named_only_where_its_damper_is_set_by_hand(number: int) -> 
         assert not tells_correctness(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("state", State)
 def test_every_state_says_what_to_do_and_none_says_anything_of_how_good_the_participant_is(
     state: State, tmp_path: Path
@@ -396,6 +397,7 @@ class Day:
         return remaining_s(Ahead(design=self.setup.config, plan=self.plan, **so_far), self.so_far)
 
 
+@pytest.mark.slow
 @given(durations=st.lists(st.floats(1, 300), min_size=1, max_size=6))
 def test_the_estimate_moves_from_the_plan_towards_what_is_measured_and_never_beyond(durations: list[float]) -> None:
     day = Day(DIRECTION)

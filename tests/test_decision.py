@@ -54,6 +54,7 @@ def area(density: Callable[[np.ndarray], np.ndarray], cuts: list[float]) -> floa
     return sum(float(half * (weights @ density(low + half * (1 + nodes)))) for low, half in parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "a", "w"), CASES)
 def test_the_density_integrates_to_one_with_the_closed_moments(v: float, a: float, w: float) -> None:
     expected = moments(v, a, w)

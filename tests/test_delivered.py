@@ -60,6 +60,7 @@ def drawn_trace(friction_N: float, slopes: tuple[float, float], offset: float, a
     return SensorTrace(time_s=times, acceleration_m_s2=values + offset)
 
 
+@pytest.mark.slow
 @given(
     friction_N=st.floats(0.3, 3.0),
     slopes=st.tuples(st.floats(-200, 200), st.floats(-200, 200)),
@@ -78,6 +79,7 @@ def test_a_step_between_two_lines_is_the_friction_whatever_their_slopes(
     assert found.onset_s == pytest.approx(at_s - 0.004 / 3, abs=2e-4)  # where a cosine of 4 ms is at its half
 
 
+@pytest.mark.slow
 @given(
     friction_N=st.floats(0.3, 3.0),
     held=st.floats(0.1, 0.9),
@@ -157,6 +159,7 @@ def test_rest_is_no_shot_and_too_few_samples_are_refused():
         measured(rest, -0.05, expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_Hz", [1500.0, RATE_HZ, 8000.0])
 @pytest.mark.parametrize("drive", [{}, {"voltage_V": 6.0}, {"voltage_V": 2.0}, {"pulse_s": 0.003}, {"pulse_s": 0.06}])
 def test_a_friction_is_measured_where_the_model_s_own_course_gives_it_and_nowhere_else(
@@ -175,6 +178,7 @@ def test_a_friction_is_measured_where_the_model_s_own_course_gives_it_and_nowher
             assert measured(seen(course(gun), random, 0.5), 0.0, expected) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gun", [GunParameters(friction_N=0.02), GunParameters(friction_N=1.12, stiffness_N_m=100.0)])
 def test_a_shot_that_the_model_does_not_bring_to_an_end_is_not_measured_and_ends_no_run(gun: GunParameters):
     sensor = SimulatedSensor("simulated", "simulated", np.random.default_rng(1))
@@ -209,6 +213,7 @@ def drilled(tmp_path_factory: pytest.TempPathFactory) -> Contents:
     return read_journal(done.place.journal)
 
 
+@pytest.mark.slow
 def test_every_shot_of_a_run_is_measured_and_stands_in_the_journal_and_a_table(drilled: Contents):
     kinds = Counter(record.kind for record in drilled.records)
     shots = rows_of(shots_table(drilled))
@@ -343,6 +348,7 @@ def test_shots_that_are_not_measured_though_the_sensor_is_heard_are_told_of_once
     assert one in told
 
 
+@pytest.mark.slow
 def test_the_last_word_of_a_sensor_is_in_the_table_and_in_the_hash_however_slow_the_disk(tmp_path, monkeypatch):
     write_all = storage.write_all
 
@@ -358,6 +364,7 @@ def test_the_last_word_of_a_sensor_is_in_the_table_and_in_the_hash_however_slow_
     assert of_journal == sha256(b"".join(contents.path.read_bytes().splitlines(keepends=True)[:-1])).hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sensor", "notes"), [("", [UNMEASURED]), ("simulated", [])])
 def test_a_run_that_was_measured_says_so_when_it_goes_on_without_its_sensor(
     tmp_path: Path, sensor: str, notes: list[str]

@@ -46,6 +46,7 @@ def test_without_a_change_each_hypothesis_has_a_ratio_of_1_on_average():
     )  # less what lies beyond 4.5
 
 
+@pytest.mark.slow
 def test_a_damper_that_slips_is_seen_within_three_shots_and_a_good_one_is_not_marked():
     random, good, bad = np.random.default_rng(6), course(DAMPED), course(slipped(DAMPED, 0.1))
     for _ in range(4):
@@ -66,6 +67,7 @@ def test_a_lasting_change_is_seen_whenever_it_comes_and_until_it_is_mended(start
     assert marks[-3:] == ["", "", ""]
 
 
+@pytest.mark.slow
 def test_a_slip_from_a_method_s_first_shot_on_is_seen_against_the_model_and_said_once():
     random = np.random.default_rng(8)
     for actuator, slip in ((DAMPED, 0.1), (LIGHT, 0.25)):

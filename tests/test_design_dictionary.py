@@ -17,6 +17,7 @@ from experiments.screens.synthetic import synthetic_screen
 from tests.designs import design
 
 
+@pytest.mark.slow
 def test_every_column_is_described_beside_the_logs_and_only_their_owner_reads_it(tmp_path):
     setup = load_setup("stronger")
     request = RunRequest(setup=setup, participant_id="P01", results=tmp_path, seed=1)

@@ -163,6 +163,7 @@ def test_ranks_have_their_degrees_of_freedom_their_people_and_their_agreement():
     assert f"Friedman's test of method: {statistics}, {row[5].removesuffix(', N = 5')}." in said
 
 
+@pytest.mark.slow
 def test_a_legend_stands_below_the_name_of_the_axis_however_low_the_panels_are(tmp_path, monkeypatch):
     name = "a long name of a level in four lines"
     coats = {"levels": [*"abcdefgh"], "labels": {level: f"{level} {name}"[:31] for level in "abcdefgh"}}
@@ -181,6 +182,7 @@ def test_a_legend_stands_below_the_name_of_the_axis_however_low_the_panels_are(t
             assert legend.y1 < called.y0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ends", "shown"),
     [
@@ -273,6 +275,7 @@ def test_a_condition_of_several_factors_is_called_by_its_levels_beside_its_d_pri
     assert "6 V, backward" in [row[1] for row in by_test.rows]
 
 
+@pytest.mark.slow
 def test_the_lowest_and_highest_of_many_conditions_are_those_of_the_shares_that_are_told():
     """Who has few trials moves the mean over people, and not the share of all: 6 V is lowest by the one alone."""
     factors = {"method": {"levels": ["a"]}, "direction": {"levels": ["forward"]}}
@@ -299,6 +302,7 @@ def rated():
     return summarise(design(factors={"method": {"levels": ["a", "b", "c"]}}, questions={"q": question}), table)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("p", "corrected", "said"),
     [

@@ -53,6 +53,7 @@ def whole(request, tmp_path_factory):
     return request.param, finished, finished.place.journal.read_bytes().splitlines(keepends=True)
 
 
+@pytest.mark.slow
 def test_every_planned_trial_has_a_row_with_every_answer(whole):
     name, finished, _ = whole
     design = SETUPS[name].config
@@ -68,6 +69,7 @@ def test_every_planned_trial_has_a_row_with_every_answer(whole):
         assert row["attempts"] == "1"
 
 
+@pytest.mark.slow
 def test_its_table_is_made_again_from_the_journal_byte_for_byte(whole):
     _, finished, _ = whole
     path, data, contents = rebuild(finished.place.journal)
@@ -89,12 +91,14 @@ def test_broken_off_anywhere_and_gone_on_with_it_has_the_same_answers(whole, tmp
         assert answers(name, rows_of(again.place.table.read_bytes())) == expected
 
 
+@pytest.mark.slow
 def test_what_the_participant_is_told_first_is_in_the_journal(tmp_path):
     finished = carried_out("voltages", tmp_path)
     told = [step.what for step, _ in history(read_journal(finished.place.journal)) if isinstance(step, Inform)]
     assert told == ["consent", "instruction"]
 
 
+@pytest.mark.slow
 def test_groups_are_filled_in_turn_and_rows_of_the_square_as_well(tmp_path):
     count = len(groups(SETUPS["grip"].config))
     found = [carried_out("grip", tmp_path, f"P0{number}").plan for number in range(1, 2 * count + 1)]
@@ -103,6 +107,7 @@ def test_groups_are_filled_in_turn_and_rows_of_the_square_as_well(tmp_path):
     assert orders == [0, 1, 0]
 
 
+@pytest.mark.slow
 def test_in_each_group_every_row_of_the_square_comes_equally_often(tmp_path):
     config = SETUPS["grip"].config
     count, rows = len(groups(config)), square_size(config)
@@ -135,6 +140,7 @@ def test_a_hand_sets_the_damper_once_a_session_where_the_design_says_so(tmp_path
     assert not any(isinstance(step, Rest) for step, _ in told) or SETUPS["realism"].config.breaks.between_sessions_s
 
 
+@pytest.mark.slow
 def test_what_hands_do_tells_nobody_which_interval_is_empty(tmp_path):
     request = RunRequest(setup=load_setup("staircase"), participant_id="P01", results=tmp_path, seed=5)
     done = run(request, synthetic_screen, VirtualClock())
@@ -162,6 +168,7 @@ def test_a_practice_has_some_of_each_cell_and_is_kept_apart(tmp_path):
     assert sorted(trial.method for trial in plan.trials) == sorted([*design.methods] * 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["voltages", "pairs", "realism"])
 def test_the_files_that_a_run_began_with_are_given_back_and_it_goes_on_with_them(name, tmp_path):
     finished = carried_out(name, tmp_path / "r")

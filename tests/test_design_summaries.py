@@ -98,6 +98,7 @@ def test_numbers_are_averaged_as_their_logarithms():
     assert cell.mean == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_detection_has_a_sensitivity_and_a_criterion():
     _, found = of("detection")
     tests = {test.name: test for test in found.questions["felt"].tests}
@@ -106,6 +107,7 @@ def test_detection_has_a_sensitivity_and_a_criterion():
     assert any(not cell.levels for cell in found.questions["felt"].cells)  # catch trials have no level
 
 
+@pytest.mark.slow
 def test_two_intervals_have_the_d_prime_of_their_task():
     config, laws = loaded("stronger")
     table = simulated(config, laws, 10)
@@ -120,6 +122,7 @@ def test_two_intervals_have_the_d_prime_of_their_task():
         assert statistic == pytest.approx(math.sqrt(2) * stats.norm.ppf(share), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_pairs_are_described_in_the_order_in_which_they_were_felt():
     _, found = of("pairs")
     cells = found.questions["rather"].cells
@@ -278,6 +281,7 @@ def test_nested_factors_are_described_and_not_tested():
     assert "factors that are nested, not crossed, are not tested here" in test.reason
 
 
+@pytest.mark.slow
 def test_more_than_two_levels_within_people_have_the_p_that_does_not_take_sphericity():
     config, laws = loaded("realism")
     table = simulated(config, laws, 24)
@@ -353,6 +357,7 @@ MODULI = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("said", MODULI.values(), ids=MODULI)
 def test_numbers_at_the_ticks_of_a_logarithmic_axis_are_those_of_their_places(said, tmp_path, monkeypatch):
     config, laws = loaded("magnitude")

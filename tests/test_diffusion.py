@@ -19,6 +19,7 @@ from tests.decisions import EXTREMES, decide_all, law, scalar
 GRID = [(v, a, w) for v in (-2.0, 0.0, 0.5, 3.0) for a in (0.7, 2.0) for w in (0.2, 0.5, 0.9)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "a", "w"), GRID)
 def test_a_batch_has_the_accuracy_mean_and_variance_of_theory(v: float, a: float, w: float) -> None:
     n = 40_000
@@ -68,6 +69,7 @@ def test_the_scalar_sampler_has_the_accuracy_and_mean_of_theory() -> None:
         assert abs(t.mean() - expected.mean_s) < 4.5 * t.std() / math.sqrt(n)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extreme", EXTREMES)
 def test_an_extreme_ends_with_a_finite_time(extreme: Diffusion) -> None:
     decisions = scalar(extreme, 100)

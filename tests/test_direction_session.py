@@ -118,6 +118,7 @@ def test_the_question_and_its_answers_are_the_configs_and_name_no_method() -> No
     assert said == {("response", "Which way did the gun shoot?", "forward", "backward")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trouble", [FAILED, FELT, UNFELT], ids=["failed", "felt", "unfelt"])
 @pytest.mark.parametrize("part", [0, 1, 2], ids=["hand-over", "shot", "question"])
 @pytest.mark.parametrize("trial", [0, 7, 59])
@@ -175,6 +176,7 @@ def test_a_session_of_one_trial_has_no_rest() -> None:
     assert [type(step) for step in driven(plan, SETUP)] == [Prepare, FireShot, Ask]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(st.dictionaries(st.integers(0, 250), st.sampled_from([FELT, UNFELT]), max_size=12))
 def test_whatever_goes_wrong_every_trial_is_answered_once_in_order(troubles: dict[int, Outcome]) -> None:

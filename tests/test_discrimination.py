@@ -28,6 +28,7 @@ def simulated(task, d):
     return np.mean(np.argmin(between, axis=0) == 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("d", [0.0, 0.5, 1.0, 2.0, 3.5])
 def test_it_is_what_people_of_that_strategy_get_right(task, d):
@@ -43,6 +44,7 @@ def test_it_begins_at_chance_and_ends_at_certainty(task):
     assert np.all(np.diff(p) >= -1e-15)
 
 
+@pytest.mark.slow
 @given(st.sampled_from(TASKS), st.integers(1, 2000), st.data())
 def test_the_share_of_its_d_prime_is_the_one_it_came_from(task, trials, data):
     right = data.draw(st.integers(0, trials))

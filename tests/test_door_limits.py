@@ -95,6 +95,7 @@ def test_of_like_findings_five_are_said_and_the_rest_counted(tmp_path: Path) -> 
     assert lines[5] == "... and 195 more like them"
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_findings_are_soon_said() -> None:
     with pytest.raises(ConfigError) as refused:
         checked_table(PaperFile, {"claims": [1] * 100_000}, "paper.toml")
@@ -109,6 +110,7 @@ def test_a_log_of_a_million_rows_is_refused_with_the_bound(tmp_path: Path) -> No
     assert all("more than 100,000 rows" in one for one in said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "said"), [(1_000_000, "more than 400,000 rows"), (100_001, "100,001 rows")])
 def test_so_is_one_that_a_map_reads(tmp_path: Path, rows: int, said: str) -> None:
     (tmp_path / "a.csv").write_bytes(b"who,m,r\n" + b"P01,a,5\n" * rows)

@@ -92,6 +92,7 @@ accuracy = [{method = "vibration", min_share = 0.51}, {method = "ramp", min_shar
     assert effect.warnings == ("the rules ask for accuracy with ramp, which no log with right answers has",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("percent", range(1, 101))
 def test_who_keeps_just_the_share_that_the_rule_asks_for_stays(percent: int, tmp_path: Path) -> None:
     """Of so many trials as make it a whole number of them; who has one less kept goes."""
@@ -184,6 +185,7 @@ reason = "left-handed"
 """
 
 
+@pytest.mark.slow
 def test_rules_hold_for_the_trials_and_people_of_any_design(tmp_path: Path) -> None:
     recoil.run_synthetic(recoil.load_config("stronger"), ["P01", "P02", "P03"], tmp_path / "results", seed=1)
     logs = read_logs([tmp_path / "results"])
@@ -199,6 +201,7 @@ def test_rules_hold_for_the_trials_and_people_of_any_design(tmp_path: Path) -> N
     assert after.table["stronger_time_s"].min() >= 0.9
 
 
+@pytest.mark.slow
 def test_who_says_the_same_to_every_trial_of_a_design_is_left_out_where_the_rules_say_so(tmp_path: Path) -> None:
     recoil.run_synthetic(recoil.load_config("stronger"), ["P01", "P02"], tmp_path / "results", seed=1)
     logs = read_logs([tmp_path / "results"])
@@ -212,6 +215,7 @@ def test_who_says_the_same_to_every_trial_of_a_design_is_left_out_where_the_rule
     assert effect.excluded[0].reason == "1 of the answers to 'stronger' are the same (rule: at most 0.9)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pairs", "staircase", "stronger"])
 def test_rules_that_leave_nobody_leave_a_report_of_nobody(name: str, tmp_path: Path) -> None:
     recoil.run_synthetic(recoil.load_config(name), ["P01", "P02"], tmp_path / "results", seed=1)
@@ -234,6 +238,7 @@ def test_what_was_planned_is_what_a_share_of_trials_kept_is_of(tmp_path: Path) -
     assert [(gone.participant, gone.rule) for gone in effect.excluded] == [("P02", "min_kept_share")]
 
 
+@pytest.mark.slow
 def test_trials_after_the_end_of_a_track_are_no_trials_to_rules(tmp_path: Path) -> None:
     recoil.run_synthetic(recoil.load_config("staircase"), ["P01"], tmp_path / "results", seed=3)
     logs = read_logs([tmp_path / "results"])
@@ -246,6 +251,7 @@ def test_trials_after_the_end_of_a_track_are_no_trials_to_rules(tmp_path: Path) 
     assert (effect.excluded, len(effect.logs.designs[0].table)) == ((), len(table))
 
 
+@pytest.mark.slow
 def test_each_study_has_its_own_people_in_the_statistics_of_designs_too(tmp_path: Path) -> None:
     for study, codes in (("a", ["P01", "P02", "P03"]), ("b", ["P01", "P02"])):
         recoil.run_synthetic(recoil.load_config("grip"), codes, tmp_path / study, seed=1)

@@ -36,6 +36,7 @@ OFFSETS = [0.0, 0.3, 1e6]
 SCALES = [1.0, 0.1, 1e200, 1e-200]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", OFFSETS)
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("people", [6, 14])

@@ -173,6 +173,7 @@ REFUSED = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("broken", [pytest.param(broken, id=name) for name, broken in REFUSED.items()])
 def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: Broken) -> None:
     check_refused(folder, broken)

@@ -232,6 +232,7 @@ def test_mean_ratings_are_near_those_that_the_config_assumes_for_the_paper(ratin
     assert np.all(np.abs(ratings.mean(axis=0) - assumed) < 0.2 + 4.5 * error)
 
 
+@pytest.mark.slow
 def test_as_many_rate_both_shots_alike_as_in_the_paper(ratings: np.ndarray) -> None:
     # 2 of 14; by chance some others come to the same grain
     share = (ratings[:, 1] == ratings[:, 2]).mean()
@@ -339,6 +340,7 @@ def test_a_check_of_the_example_has_the_words_that_are_read_out(recoil: Recoil) 
         assert text in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_an_adaptive_session_brackets_the_voltage_that_the_percept_gives(seed: int, tmp_path: Path) -> None:
     """`make soak` has 500 of them (gun_threshold)."""

@@ -190,6 +190,7 @@ def test_rates_at_the_ends_are_fitted_with_what_intervals_there_are(
     assert pasted(text, tmp_path).percept.own.sensitivity >= 0.0
 
 
+@pytest.mark.slow
 def test_a_fit_too_unsure_to_draw_from_is_not_drawn_from() -> None:
     rates = {"vibration": 0.1, "asymmetric-1": 1.0, "asymmetric-2": 1.0}
     assert not any(case.drawn for case in cases_of(rates, METHODS, PAPER_TRIALS, PerceptParameters()))
@@ -295,6 +296,7 @@ def test_a_paper_of_which_a_mean_is_missing_is_refused(tmp_path: Path) -> None:
         read_request(PerceptRequest(paper=str(path)))
 
 
+@pytest.mark.slow
 def test_one_study_is_judged_too_and_a_place_that_cannot_be_is_said_before_the_work(
     recoil: Recoil, tmp_path: Path
 ) -> None:

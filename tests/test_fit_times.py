@@ -112,6 +112,7 @@ def test_methods_of_a_map_stand_in_its_order_under_its_labels_wherever_they_are_
         assert not re.search(r"\b(weak|mid|strong)\b", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profiled", [False, True])
 def test_that_the_best_share_of_lapses_is_none_is_no_want_of_data(tmp_path: Path, profiled: bool) -> None:
     request = TimesRequest(paths=[study(tmp_path / "logs", people=3)], lapses="0.2-60", profiled=profiled)
@@ -125,6 +126,7 @@ def test_that_the_best_share_of_lapses_is_none_is_no_want_of_data(tmp_path: Path
     assert "do not determine lapse" not in (tmp_path / "out/report.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_log_without_instructions_has_one_boundary(tmp_path: Path, recoil: Recoil) -> None:
     rows = [{key: value for key, value in row.items() if key != "instruction"} for row in decided("P01", 1)]
     write_rows(trials_path(tmp_path / "logs", "P01"), rows, header=list(rows[0]))
@@ -136,6 +138,7 @@ def test_a_log_without_instructions_has_one_boundary(tmp_path: Path, recoil: Rec
     assert (found["mean_of_people"], found["each"]) == (None, {})
 
 
+@pytest.mark.slow
 def test_a_table_that_was_rebuilt_is_used_and_named(tmp_path: Path) -> None:
     setup = load_setup("direction")
     request = RunRequest(setup=setup, participant_id="P01", results=tmp_path / "results", seed=1)
@@ -192,6 +195,7 @@ def test_the_prediction_is_the_distribution_of_both_answers_and_ends_at_one() ->
     assert predicted.right[-1] + predicted.wrong[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_predicted_lapses_are_coins_over_their_range() -> None:
     data = made(1, people=6, times=4, lapse=0.2)
     found = fit(data, lapses=(0.3, 3.0))

@@ -103,6 +103,7 @@ reason = "left-handed"
 """
 
 
+@pytest.mark.slow
 def test_each_person_is_left_out_once_in_plain_words_with_the_dropped_trials(
     study: Path, reported: Reported, tmp_path: Path
 ) -> None:
@@ -126,6 +127,7 @@ def test_each_person_is_left_out_once_in_plain_words_with_the_dropped_trials(
     assert not any(word in said for word in ("min_kept_share", "drop_", "never together", "trusted", "synthetic"))
 
 
+@pytest.mark.slow
 def test_of_a_design_dropped_trials_and_stopped_runs_are_told_with_who_was_analysed(
     tmp_path: Path, reported: Reported
 ) -> None:
@@ -153,6 +155,7 @@ def test_who_is_listed_by_hand_is_told_so_though_a_rule_would_leave_them_out(
     assert next(one.rule for one in excluded if one.participant == "P05") == "min_kept_share"
 
 
+@pytest.mark.slow
 def test_a_title_is_alike_for_a_folder_and_for_its_files(study: Path, reported: Reported) -> None:
     files = sorted(study.rglob("*_trials.csv"))
     assert reported(study).title == reported(*files[::-1]).title == "Statistics of results"
@@ -232,6 +235,7 @@ def test_people_who_say_the_same_to_everything_are_named_and_kept(careless: Repo
     assert "said backward" not in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("codes", [("P02",), ("P01", "P02", "P03")])
 def test_people_without_backward_trials_are_reported_with_what_they_have(
     tmp_path: Path, reported: Reported, codes: tuple[str, ...]
@@ -262,6 +266,7 @@ def test_numbers_of_trials_that_differ_are_said_as_they_are(careless: ReportData
     assert any("not everybody has as many trials" in item for item in section.items)
 
 
+@pytest.mark.slow
 def test_only_lines_that_are_drawn_are_promised(careless: ReportData, tmp_path: Path, reported: Reported) -> None:
     assert careless.statistics.direction is not None
     caption = directions_picture(careless.statistics.direction).caption
@@ -271,6 +276,7 @@ def test_only_lines_that_are_drawn_are_promised(careless: ReportData, tmp_path: 
     assert "the absence of bias, and the d′ of somebody who is always right" in directions_picture(whole).caption
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["forward", "backward"])
 def test_of_trials_in_one_direction_nothing_is_promised_of_the_other(
     tmp_path: Path, reported: Reported, way: str
@@ -303,6 +309,7 @@ def test_a_time_of_exactly_0_is_told_as_a_reason_for_having_none(tmp_path: Path,
     assert "None in 2 answered trials: there is no time in the log, or it is 0, or the" in section.paragraphs[0]
 
 
+@pytest.mark.slow
 def test_beside_designs_it_is_said_of_what_the_response_times_are(careless: ReportData, tmp_path: Path) -> None:
     (alone,) = quality_section(careless)
     assert "valid response times. None in" in alone.paragraphs[0]

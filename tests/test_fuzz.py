@@ -18,6 +18,7 @@ def every(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Reader]:
     return readers(real_runs(tmp_path_factory.mktemp("fuzz") / "runs"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_reader_takes_anything_or_says_what_is_wrong(name: str, every: Mapping[str, Reader], tmp_path: Path) -> None:
     found = [one for _, _, one in fuzzed(name, every[name], tmp_path, range(SOME))]

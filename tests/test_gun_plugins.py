@@ -69,6 +69,7 @@ def test_the_simulated_gun_keeps_what_every_gun_keeps():
     assert broken(conformance(rig_at("simulated", trials=TRIALS))) == []
 
 
+@pytest.mark.slow
 def test_the_twin_keeps_it(tmp_path):
     with a_twin(tmp_path, speed=20.0) as (twin, socket):
         rig = rig_at(
@@ -84,6 +85,7 @@ def test_the_firmware_keeps_it(tmp_path):
         assert broken(conformance(rig)) == []
 
 
+@pytest.mark.slow
 def test_a_plug_in_keeps_it(sound_card):
     import sound_card_gun
 
@@ -170,12 +172,14 @@ def open_gun(address, methods, clock):
 """
 
 
+@pytest.mark.slow
 def test_a_plug_in_that_hangs_at_import_is_refused_by_name(tmp_path, monkeypatch):
     install(monkeypatch, tmp_path, HANGS, name="sleeper", module="sleeper_gun")
     with pytest.raises(PluginError, match=r"gun plug-in sleeper: its import did not end within 1 s; .* uninstall it"):
         door.try_import("sleeper", 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("source", "said"),
     [
@@ -196,6 +200,7 @@ def test_a_plug_in_that_cannot_be_imported_is_refused_by_name(tmp_path, monkeypa
         open_gun("bad:1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("source", "said"),
     [
@@ -213,6 +218,7 @@ def test_what_a_plug_in_opens_must_be_a_gun(tmp_path, monkeypatch, source, said)
         open_gun("bad:1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", ["1 / 0", "exit()", "Gun(disarm=None)"])
 @pytest.mark.parametrize("shots", [0, 5])
 def test_a_doctor_whose_gun_breaks_off_while_it_is_opened_says_that_it_may_be_armed(tmp_path, monkeypatch, made, shots):
@@ -258,6 +264,7 @@ def test_no_plug_in_takes_the_name_of_a_gun_of_ours_and_those_that_are_there_are
         open_gun("usb:1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("broken", "said"),
     [
@@ -313,6 +320,7 @@ def test_what_a_plug_in_prints_is_no_result(tmp_path: Path, monkeypatch: pytest.
         assert said in done.stderr
 
 
+@pytest.mark.slow
 def test_a_gun_that_does_not_open_is_said_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, tmp_path, "1 / 0\n", name="bad", module="bad_gun")
     (only,) = conformance(rig_at("bad:"))
@@ -320,6 +328,7 @@ def test_a_gun_that_does_not_open_is_said_once(tmp_path: Path, monkeypatch: pyte
     assert "ZeroDivisionError" in only.said
 
 
+@pytest.mark.slow
 def test_a_kit_that_is_broken_off_lets_go_of_its_gun_at_once_and_opens_no_other(sound_card: str) -> None:
     rig, guns, found = rig_at(sound_card, trials=10_000, speed=10.0), list[Gun](), list[ConformanceFinding]()
 
@@ -409,6 +418,7 @@ def open_gun(address, methods, clock):
 """
 
 
+@pytest.mark.slow
 def test_a_doctor_fires_the_methods_of_the_gun_that_it_is_given_and_no_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -528,6 +538,7 @@ def test_a_doctor_that_cannot_disarm_its_gun_says_so_whatever_else_it_found(
     assert json.loads((tmp_path / "found.json").read_text()) == found
 
 
+@pytest.mark.slow
 def test_a_check_whose_time_is_over_and_whose_gun_cannot_be_disarmed_ends_all_checks(tmp_path, monkeypatch):
     more = "disarm = lambda self: 1 / 0; status = lambda self: __import__('time').sleep(3)"
     install(monkeypatch, tmp_path, GUN.format(more=more, made="Gun()"), name="dead", module="dead_gun")
@@ -667,6 +678,7 @@ def test_a_plug_in_that_breaks_off_is_a_link_that_failed(clock, acts):
     assert not liar.is_armed
 
 
+@pytest.mark.slow
 def test_a_signal_that_another_thread_takes_wakes_who_waits_for_a_plug_in():
     with stolen_signal(), pytest.raises(Told):
         guard.answer_within(PATIENCE_S, threading.Event().wait)
@@ -770,6 +782,7 @@ def hangups() -> Iterator[Hangups]:
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.slow
 def test_no_interrupt_keeps_a_gun_from_being_disarmed_and_closed(clock, hangups):
     closed = threading.Event()
     gun, liar = guarded(clock, disarms=hangups.press, closes=closed.set)
@@ -779,6 +792,7 @@ def test_no_interrupt_keeps_a_gun_from_being_disarmed_and_closed(clock, hangups)
     assert not liar.is_armed
 
 
+@pytest.mark.slow
 def test_a_gun_that_is_not_disarmed_is_told_of_whatever_interrupts(clock, hangups):
     gun, _ = guarded(clock, disarms=hangups.press, stays_armed=True)
     with pytest.raises(PluginError, match="is armed after it was disarmed; switch off its power"):
@@ -787,6 +801,7 @@ def test_a_gun_that_is_not_disarmed_is_told_of_whatever_interrupts(clock, hangup
         gun.status()  # which a window shows
 
 
+@pytest.mark.slow
 def test_who_closes_a_gun_that_another_is_closing_learns_what_became_of_it(clock, monkeypatch):
     monkeypatch.setattr(guard, "DISARM_S", 0.3)
     begun, on = threading.Event(), threading.Event()
@@ -800,6 +815,7 @@ def test_who_closes_a_gun_that_another_is_closing_learns_what_became_of_it(clock
     on.set()
 
 
+@pytest.mark.slow
 def test_an_interrupt_while_a_plug_in_is_first_asked_leaves_it_disarmed(clock, hangups):
     liar, first = Liar(clock), iter([hangups.press])
     liar.is_armed = True
@@ -876,6 +892,7 @@ def test_a_plug_in_that_cannot_be_closed_leaves_a_finished_run_and_says_to_switc
     assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).finished
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("broken_off", "before", "last"),
     [(KeyboardInterrupt(), "", "stopped"), (JournalError("the disk is full"), "the disk is full; ", "step")],
@@ -904,6 +921,7 @@ def test_a_run_that_is_broken_off_says_that_its_gun_could_not_be_closed(  # noqa
     assert read_journal(next(tmp_path.glob("sub-P01/*_journal.jsonl"))).records[-1].kind == last
 
 
+@pytest.mark.slow
 def test_a_plug_in_that_hangs_in_a_shot_stops_the_run_which_says_to_switch_off_its_power(
     tmp_path: Path, sound_card: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

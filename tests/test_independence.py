@@ -40,6 +40,7 @@ def is_private(name: str) -> bool:
     return name.startswith("_") and not name.endswith("__") and name not in LET_THROUGH
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
 def test_no_test_module_is_imported_and_nothing_private_reached_into(path: Path) -> None:
     tree = ast.parse(path.read_text(encoding="utf-8"))

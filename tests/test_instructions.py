@@ -58,6 +58,7 @@ def by_set(plan: Plan) -> dict[tuple[int, int], set[str]]:
 # the plan
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.integers(1, 4), st.integers(1, 3), st.integers(0, 2**63 - 1))
 def test_each_instruction_comes_equally_often_in_every_session_one_a_set(count: int, each: int, seed: int) -> None:
@@ -69,6 +70,7 @@ def test_each_instruction_comes_equally_often_in_every_session_one_a_set(count: 
         assert found == dict.fromkeys(NAMES[:count], each)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 2**63 - 1))
 def test_instructions_change_nothing_else_of_a_plan(seed: int) -> None:
@@ -78,6 +80,7 @@ def test_instructions_change_nothing_else_of_a_plan(seed: int) -> None:
     assert tuple(with_levels(trial, instruction="") for trial in instructed.trials) == plain.trials
 
 
+@pytest.mark.slow
 def test_every_order_of_instructions_comes_as_often_as_each_other() -> None:
     # six orders of three, in 3 x 400 sessions; chi-square with 5 degrees of freedom, p = 1e-4
     config = with_instructions(NAMES[:3], 3)
@@ -181,6 +184,7 @@ def test_the_first_record_and_the_table_hold_each_trials_instruction(done: tuple
     assert read_out == [TEXTS[name] for name in planned]
 
 
+@pytest.mark.slow
 def test_the_answers_of_the_hurried_are_quicker(done: tuple[Path, Path]) -> None:
     with done[1].open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

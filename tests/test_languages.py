@@ -84,6 +84,7 @@ def test_the_template_and_every_catalogue_have_every_text_with_the_same_names_in
             assert [text for text, said in found.items() if placeholders(text) != placeholders(said)] == []
 
 
+@pytest.mark.slow
 def test_the_template_of_the_consoles_captions_is_as_the_console_has_them():
     made = runpy.run_path(str(ROOM.parent / "scripts" / "catalogues"))["console_template"]()
     with (SHIPPED / "console.pot").open("rb") as file:
@@ -149,6 +150,7 @@ def sentences(tree):
                 yield text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", [path for path in CONSOLE if path.name not in OF_THE_PROGRAM], ids=lambda path: path.stem
 )
@@ -382,6 +384,7 @@ SHOWN = st.text(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(SHOWN, SHOWN, max_size=5), st.sampled_from([0, 20]))
 def test_a_source_is_read_as_babel_writes_it(said, width):
     made = Catalog()
@@ -489,6 +492,7 @@ def test_english_looks_for_no_font_and_arabic_is_looked_for_in_the_forms_that_ar
     assert found.path is not None
 
 
+@pytest.mark.slow
 def test_what_counts_as_english_is_shown_in_any_font_that_has_its_letters():
     assert font_for(ENGLISH, "Wie fühlte es sich an?").family == "Noto Sans"
     found = font_for(ENGLISH, "ʘ ⅓ ☺ ⠿")  # of which Noto Sans has not all
@@ -516,6 +520,7 @@ def test_a_run_in_english_records_no_language(tmp_path):
     assert read_journal(place.journal).head.language is None
 
 
+@pytest.mark.slow
 def test_a_run_records_its_language_and_what_was_shown_and_its_table_is_the_same(tmp_path, folder):
     place = carried_out(tmp_path / "long", language(LONG, folder), design="detection")
     head = head_of(place)
@@ -532,6 +537,7 @@ def test_a_run_records_its_language_and_what_was_shown_and_its_table_is_the_same
     assert answers.sub(b"", place.table.read_bytes()) == answers.sub(b"", plain.table.read_bytes())
 
 
+@pytest.mark.slow
 def test_what_is_told_after_an_answer_is_in_the_language(tmp_path, folder):
     setup = load_setup("detection")
     trial = setup.config.trial.model_copy(update={"feedback": True})
@@ -599,6 +605,7 @@ def run_file(place, code):
     return RunFile(path=str(place.journal), participant=code, experiment="preference", kind="synthetic", study="")
 
 
+@pytest.mark.slow
 def test_the_doctor_names_the_font_and_what_is_amiss(folder):
     def verdict(code):
         wanted = checks(Path("results"), "simulated", 0.01, asked=LanguageAsked(code=code, folder=folder))
@@ -655,6 +662,7 @@ def test_a_catalogue_that_cannot_be_read_is_told_and_hides_no_other(tmp_path):
     assert line.startswith(f"left out: {broken}: line 1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", [None, "zh"])
 def test_that_nobody_has_checked_a_language_is_accepted_once_a_run(code, tmp_path):
     begun = carried_out(tmp_path, language("zh"))
@@ -675,6 +683,7 @@ def test_a_run_that_began_in_a_checked_language_is_asked_about_once_nobody_vouch
         run_session(resuming(tmp_path), LanguageOptions(folder=own))
 
 
+@pytest.mark.slow
 def test_at_the_console_a_run_is_gone_on_with_in_its_own_language_whatever_stands_in_the_window(tmp_path, folder):
     cut(carried_out(tmp_path, language("zh")))
     assert gone_on_with(replace(resuming(tmp_path), language=language(LONG, folder))).language.code == "zh"

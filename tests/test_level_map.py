@@ -51,6 +51,7 @@ def lab(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_map_gives_the_fits_of_the_counts_themselves(lab: Path) -> None:
     found = mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")
     own = psychometric_fit([*RIGHT], [*RIGHT.values()], [20] * 5, guess=0.5)
@@ -62,6 +63,7 @@ def test_a_map_gives_the_fits_of_the_counts_themselves(lab: Path) -> None:
     assert found.to_frame()["threshold"].nunique() == 1
 
 
+@pytest.mark.slow
 def test_where_nobody_has_a_threshold_among_the_levels_no_mean_is_told(lab: Path) -> None:
     rows = [f"VP_0{who};{level};{'ja' if who == 1 else 'nein'};links" for who in (1, 2) for level in (6, 10, 14) * 20]
     (lab / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *rows]) + "\n")
@@ -71,6 +73,7 @@ def test_where_nobody_has_a_threshold_among_the_levels_no_mean_is_told(lab: Path
     assert row == "| links | 2 | – | – | – | – | – | 2 |"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("exponent", "shown"),
     [("E-12", r"\d\.\d\de−11 \["), ("E+20", r"\d\.\d\de\+21 \["), ("", r"\b1?\d\.\d\d \[")],

@@ -18,10 +18,12 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return real_runs(tmp_path_factory.mktemp("runs"))
 
 
+@pytest.mark.slow
 def test_of_runs_that_do_not_lie_nothing_is_said(runs: Path) -> None:
     assert said_of(read_logs([runs])) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lie", LIES, ids=lambda lie: f"{lie.what}: {lie.how}")
 def test_what_lies_is_said(lie: Lie, runs: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(runs, tmp_path / "results"))

@@ -374,6 +374,7 @@ def broken_cases() -> list:
     return [pytest.param(broken, id=name) for name, broken in cases]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("broken", broken_cases())
 def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: Broken) -> None:
     check_refused(folder, broken)

@@ -114,6 +114,7 @@ BAD_TRIALS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BAD_TRIALS)
 def test_a_trials_file_that_breaks_a_rule_is_left_out_with_place_value_and_rule(case: str, tmp_path: Path) -> None:
     spoil, words = BAD_TRIALS[case]
@@ -161,6 +162,7 @@ BAD_BYTES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BAD_BYTES)
 def test_a_file_that_is_no_table_is_left_out_with_place_and_rule(case: str, tmp_path: Path) -> None:
     spoil, words = BAD_BYTES[case]

@@ -219,6 +219,7 @@ def test_what_an_odd_library_does_in_a_run_is_said_once(  # noqa: PLR0917
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_markers_need_a_folder_that_is_there_and_a_library(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("markers", "nowhere").returncode == 2
     (tmp_path / "fake").mkdir()
@@ -277,6 +278,7 @@ TEST_SHOT = {"kind": "test-shot", "method": "vibration", "held_s": 1.0}
 COUNTS = dict.fromkeys(("gun_accepted_us", "gun_start_us", "gun_end_us", "gun_count", "asked"), 1)
 
 
+@pytest.mark.slow
 def test_a_shots_uncertainty_is_the_guns_own_or_else_lies_between_request_and_record(
     whole: bytes, tmp_path: Path
 ) -> None:

@@ -25,6 +25,7 @@ def drawn(person_sd, effect=1.0):
     return (DRAW.random(WHO.size) < special.expit(eta)).astype(int)
 
 
+@pytest.mark.slow
 def test_the_likelihood_is_its_integral_by_quadpack():
     right = drawn(1.0)
     found = random_intercept_logit(right, WHO, {"force": FORCE})
@@ -79,6 +80,7 @@ def test_people_with_one_kind_of_answer_each_have_no_finite_spread():
     assert random_intercept_logit((WHO % 2).tolist(), WHO, {"force": FORCE}).reason == RUNS_AWAY
 
 
+@pytest.mark.slow
 def test_every_small_table_has_an_estimate_or_a_reason():
     draw = np.random.default_rng(12)
     reasons = set()

@@ -107,6 +107,7 @@ def test_a_public_name_stands_in_one_module_or_has_a_reason(found: dict[str, lis
     assert unexcused == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", EXCEPTIONS)
 def test_every_exception_is_still_one(found: dict[str, list[str]], reason: str) -> None:
     assert set(EXCEPTIONS[reason].names.split()) - found.keys() == set()

@@ -13,6 +13,7 @@ from experiments.load import load_setup, load_study, shipped_folder
 from recoil.config_files import designs, new_study, schemas, shipped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", designs())
 def test_a_study_of_a_shipped_design_is_for_everybody_and_knows_no_paper(name, tmp_path):
     folder = tmp_path / "study"

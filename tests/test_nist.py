@@ -14,6 +14,7 @@ CEILINGS = dict(zip(NAMES, (10.15, 13.05, 15.0, 15.0, 15.0, 10.35, 10.15, 10.15,
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="this scipy comes without its test data")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_F_has_fourteen_digits_of_the_exact_one_and_all_certified_ones_that_doubles_leave(name: str) -> None:
     groups, certified = read(name)

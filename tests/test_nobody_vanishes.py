@@ -48,6 +48,7 @@ def ran(folder: Path, code: str = "P01", config: str = "preference", **how: obje
     run(asked, synthetic_screen, LaterClock())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["direction", "realism"])
 def test_a_gun_that_was_changed_within_a_study_is_told(
     experiment: str, quick_configs: Path, recoil: Recoil, tmp_path: Path
@@ -103,6 +104,7 @@ def broken_off(folder: Path, code: str, records: int) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_unanswered_trials_are_told_with_everybody_and_the_remedy(recoil: Recoil, tmp_path: Path) -> None:
     results = write_study(tmp_path / "results", participants=4)
     for code, missing in (("P02", 1), ("P04", 2)):
@@ -123,6 +125,7 @@ def test_unanswered_trials_are_told_with_everybody_and_the_remedy(recoil: Recoil
     assert "drop_unanswered" in report
 
 
+@pytest.mark.slow
 def test_everybody_is_counted_in_every_experiment(tmp_path: Path) -> None:
     results = write_study(tmp_path, participants=2)
     trials_path(results, "P02").write_bytes(b"participant_id\r\n")
@@ -140,6 +143,7 @@ def test_everybody_is_counted_in_every_experiment(tmp_path: Path) -> None:
     assert sum(one.participant == "P01" for one in found.absent) == 0
 
 
+@pytest.mark.slow
 def test_a_finished_run_without_its_table_is_analysed_exported_and_named(recoil: Recoil, tmp_path: Path) -> None:
     results = tmp_path / "results"
     for code in ("P01", "P02"):
@@ -171,6 +175,7 @@ def test_an_unfinished_synthetic_run_beside_people_is_kept_out_and_nobody_has_be
     assert (found.experiments["preference"].begun, found.experiments["preference"].left_out) == (0, 0)
 
 
+@pytest.mark.slow
 def test_the_same_code_that_has_begun_at_another_lab_is_another_person(tmp_path: Path) -> None:
     write_study(tmp_path / "kyoto", participants=2)
     broken_off(tmp_path / "oslo", "P01", 9)
@@ -196,6 +201,7 @@ def test_synthetic_participants_beside_people_are_in_no_count(tmp_path: Path) ->
     assert found.participation.absent == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["analyze", "export"])
 def test_of_unfinished_runs_alone_it_is_said_how_to_go_on(recoil: Recoil, tmp_path: Path, command: str) -> None:
     path = broken_off(tmp_path / "results", "P01", 9)
@@ -203,6 +209,7 @@ def test_of_unfinished_runs_alone_it_is_said_how_to_go_on(recoil: Recoil, tmp_pa
     refused(recoil(command, *words), "P01 has begun preference", "--participant P01 --resume", f"recoil rebuild {path}")
 
 
+@pytest.mark.slow
 def test_somebody_elses_unreadable_journal_stops_no_run_of_a_balanced_order(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("configs", "--copy", tmp_path / "configs").returncode == 0
     config = tmp_path / "configs" / "preference.toml"
@@ -218,6 +225,7 @@ def test_somebody_elses_unreadable_journal_stops_no_run_of_a_balanced_order(reco
     assert table(tmp_path / "results", "preference", "P02").exists()
 
 
+@pytest.mark.slow
 def test_a_clock_that_ran_backwards_is_flagged_and_bids_counts_no_onset_after_it(
     recoil: Recoil, tmp_path: Path
 ) -> None:
@@ -267,6 +275,7 @@ def test_a_copy_of_a_folder_leaves_out_nobody_and_the_original_stays(tmp_path: P
     assert statistics.participation.absent == ()
 
 
+@pytest.mark.slow
 def test_the_archive_of_a_study_beside_it_is_nobody_else(quick_configs: Path, tmp_path: Path) -> None:
     results, archive = tmp_path / "study" / "results", tmp_path / "archive"
     for code in ("P01", "P02", "P03"):
@@ -291,6 +300,7 @@ def test_the_archive_of_a_study_beside_it_is_nobody_else(quick_configs: Path, tm
         assert {one.participant for one in found.participation.absent} == {"P03"}
 
 
+@pytest.mark.slow
 def test_of_two_archives_of_a_study_each_run_counts_once(quick_configs: Path, tmp_path: Path) -> None:
     people = quick_configs / "synthetic" / "preference.toml"
     people.write_text(people.read_text().replace('law = "words"', 'law = "words"\ntexts = ["like a mule"]'))
@@ -303,6 +313,7 @@ def test_of_two_archives_of_a_study_each_run_counts_once(quick_configs: Path, tm
     assert logs.files == (said,)
 
 
+@pytest.mark.slow
 def test_a_run_that_went_on_since_it_was_archived_counts_once(tmp_path: Path) -> None:
     results = tmp_path / "study" / "results"
     path = broken_off(results, "P01", 40)
@@ -315,6 +326,7 @@ def test_a_run_that_went_on_since_it_was_archived_counts_once(tmp_path: Path) ->
     assert read_logs([tmp_path]).files == (table(results, "preference"),)
 
 
+@pytest.mark.slow
 def test_of_archives_of_different_dates_and_of_an_archive_of_an_archive_each_run_counts_once(tmp_path: Path) -> None:
     study, results = tmp_path / "study", tmp_path / "study" / "results"
     rebuild_table(broken_off(results, "P01", 40))
@@ -329,6 +341,7 @@ def test_of_archives_of_different_dates_and_of_an_archive_of_an_archive_each_run
     assert read_logs([study, tmp_path / "twice"]).files == (table(results, "preference"),)
 
 
+@pytest.mark.slow
 def test_a_run_that_was_set_aside_does_not_come_back_by_an_older_archive(tmp_path: Path) -> None:
     results = tmp_path / "study" / "results"
     path = broken_off(results, "P01", 40)
@@ -340,6 +353,7 @@ def test_a_run_that_was_set_aside_does_not_come_back_by_an_older_archive(tmp_pat
     assert read_logs([tmp_path]).files == (table(results, "preference"),)
 
 
+@pytest.mark.slow
 def test_what_is_said_of_logs_that_were_used_stands_in_the_statistics(tmp_path: Path) -> None:
     results = tmp_path / "results"
     for code in ("P01", "P02"):
@@ -353,6 +367,7 @@ def test_what_is_said_of_logs_that_were_used_stands_in_the_statistics(tmp_path: 
     assert str(tmp_path) not in json.dumps(found["log_remarks"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["direction", "preference", "realism"])
 def test_a_table_that_holds_more_than_its_cut_journal_is_not_to_be_rebuilt(experiment: str, tmp_path: Path) -> None:
     ran(tmp_path, "P01", experiment)

@@ -29,6 +29,7 @@ def test_every_post_hoc_keeps_the_error_that_it_claims(found) -> None:
         assert max(one.null_error, one.partial_error) < bound, one
 
 
+@pytest.mark.slow
 def test_pooling_the_error_is_nominal_at_sphericity_and_liberal_far_from_it(found) -> None:
     at_one, _, far = of(found, "Tukey, pooled error")
     assert at_one.epsilon == pytest.approx(1.0)

@@ -52,6 +52,7 @@ def test_the_first_participants_take_the_rows_in_turn() -> None:
     assert used == [*range(6), *range(6)]
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.sampled_from(SQUARES), st.integers(2, 8), st.lists(st.none() | st.integers(0, 99), max_size=60))
 def test_counts_stay_within_one_after_any_drop_outs(order: str, count: int, events: list[int | None]) -> None:
@@ -69,6 +70,7 @@ def test_counts_stay_within_one_after_any_drop_outs(order: str, count: int, even
     assert max(times.values()) - min(times.values()) <= 1
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.sampled_from(SQUARES), st.integers(2, 8), st.integers(0, 200))
 def test_without_drop_outs_counts_differ_by_one_at_most_at_any_time(order: str, count: int, people: int) -> None:
@@ -79,6 +81,7 @@ def test_without_drop_outs_counts_differ_by_one_at_most_at_any_time(order: str, 
     assert max(times) - min(times) <= 1
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.sampled_from(SQUARES), st.integers(2, 8), st.lists(st.integers(0, 15), max_size=40))
 def test_the_next_row_is_one_that_no_other_was_used_less_than(order: str, count: int, taken: list[int]) -> None:

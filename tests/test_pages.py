@@ -34,6 +34,7 @@ def follow(text: str, folder: Path) -> None:
         reader.follow(block)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "code", "said"), FAILING)
 def test_a_block_that_fails_is_named_with_page_and_line(words: str, code: str, said: str, tmp_path: Path) -> None:
     folder = tmp_path / "scratch"
@@ -65,6 +66,7 @@ def test_a_block_without_an_end_and_a_command_in_the_text_that_there_is_not_are_
         run_blocks.check_text(Path("page.md"), "text\nSee `recoil rum`.\n")
 
 
+@pytest.mark.slow
 def test_every_key_has_a_meaning_and_every_command_an_example() -> None:
     assert {"commands.md", "columns.md", "statistics.md", "config-design.md"} <= generate.pages().keys()
 

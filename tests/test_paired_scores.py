@@ -27,6 +27,7 @@ def scored(wins: Any, **more: Any) -> np.ndarray:
     return np.array([one.score for one in found.scores])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", GOLDEN[:12], ids=str)
 def test_scores_are_those_of_choix(case: dict[str, Any]) -> None:
     assert scored(case["wins"]) == pytest.approx(case["scores"], abs=1e-6)
@@ -74,6 +75,7 @@ def can_grow(wins: np.ndarray, ties: np.ndarray) -> bool:
     return linprog(np.zeros(len(wins)), bounds, [-of for _, _, of in rows], bounds=(None, None)).status == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 @given(some.lists(some.integers(0, 2), min_size=9, max_size=9))
 def test_there_are_scores_where_they_and_the_ties_cannot_grow_together(model: PairModel, counts: list[int]) -> None:
@@ -87,6 +89,7 @@ def test_there_are_scores_where_they_and_the_ties_cannot_grow_together(model: Pa
     assert ("ties" in told) == can_grow(wins, ties)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 @given(some.permutations(range(3)))
 def test_the_order_of_the_items_is_nothing(model: PairModel, order: list[int]) -> None:
@@ -124,6 +127,7 @@ def test_counts_that_are_none_are_refused(items: str, wins: Any, more: dict[str,
         paired_scores(list(items), wins, **more)
 
 
+@pytest.mark.slow
 @given(some.integers(3, 7), some.randoms(use_true_random=False))
 def test_circular_triads_are_counted_as_by_hand(n: int, draws: Any) -> None:
     wins = np.zeros((n, n), int)
@@ -164,6 +168,7 @@ def test_of_two_items_the_sandwich_is_that_of_a_mean_of_shares() -> None:
     assert found.scores[0].high - found.scores[0].score == pytest.approx(reach, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_scores_and_errors_are_those_of_r(model: PairModel) -> None:
     """`glm` with a logit or probit. Its errors are by the expected information, of a logit the observed one."""

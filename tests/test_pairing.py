@@ -77,6 +77,7 @@ def test_two_items_are_one_pair() -> None:
     assert len({frozenset(choice[:2]) for choice in run(pairing_rule(2, Stream(1, "pairs")), np.arange(2), 4)}) == 1
 
 
+@pytest.mark.slow
 @given(some_choices)
 def test_what_comes_next_is_that_of_the_counts_and_of_the_pair_before(choices: list[tuple[int, int, float]]) -> None:
     """So a correction counts as if it had been said at once, and a resumed run goes on as the one that broke off."""
@@ -90,6 +91,7 @@ def test_what_comes_next_is_that_of_the_counts_and_of_the_pair_before(choices: l
     assert [set(RULE.pairs[place].tolist()) for place in many] == [set(pair)] * 2
 
 
+@pytest.mark.slow
 @given(some_choices, some.floats(0.3, 5.0))
 def test_scores_are_the_posteriors_mode_and_the_covariance_its_curvature(
     choices: list[tuple[int, int, float]], spread: float
@@ -120,6 +122,7 @@ def test_scores_are_found_however_one_sided_the_choices() -> None:
     assert np.all(np.diff(scores) < 0)
 
 
+@pytest.mark.slow
 @given(some_choices)
 def test_gains_are_the_doubt_of_order_that_one_more_choice_takes_away(choices: list[tuple[int, int, float]]) -> None:
     """By hand for one pair: the normal posterior after either choice, and Σ π (1 - π) of all pairs."""

@@ -138,6 +138,7 @@ def test_check_says_how_pairs_are_chosen_and_counts_the_two_that_shake_most() ->
     assert found.exposure.a8_m_s2 > check_design(strongest, 1, ["P01"]).exposure.a8_m_s2
 
 
+@pytest.mark.slow
 def test_synthetic_participants_are_ranked_as_they_were_made(logs: Path) -> None:
     found = recoil.analyze(logs)
     assert not found.excluded

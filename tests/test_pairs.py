@@ -51,6 +51,7 @@ def test_wins_are_counted_in_both_orders_and_scored(found: PairedComparison, tab
     assert len(condition.participants) == 4
 
 
+@pytest.mark.slow
 def test_a_third_answer_is_a_tie_and_half_a_choice(config: DesignConfig, table: pd.DataFrame) -> None:
     values = config.model_dump()
     values["questions"]["rather"] |= {"answers": ("first", "second", "neither"), "keys": {}}
@@ -86,6 +87,7 @@ def test_items_that_were_never_chosen_are_named(config: DesignConfig, table: pd.
     assert section.pictures == ()
 
 
+@pytest.mark.slow
 def test_the_pages_have_scores_of_both_models_and_everybodys_circles(
     config: DesignConfig, table: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -99,6 +101,7 @@ def test_the_pages_have_scores_of_both_models_and_everybodys_circles(
     assert (tmp_path / "scores.png").is_file()
 
 
+@pytest.mark.slow
 def test_that_a_tie_counts_as_half_a_choice_is_said_where_there_may_be_one(
     config: DesignConfig, table: pd.DataFrame
 ) -> None:

@@ -117,6 +117,7 @@ def test_a_screen_that_is_never_ready_is_not_waited_for_longer_than_said(child):
         link.wait_ready(0.3)
 
 
+@pytest.mark.slow
 def test_a_late_answer_is_never_taken_for_that_of_the_next_question(child):
     link = child(
         "ready()\nasked = []\n"
@@ -130,6 +131,7 @@ def test_a_late_answer_is_never_taken_for_that_of_the_next_question(child):
     assert link.ask_rating(SCALE, PATIENCE_S).rating == 2
 
 
+@pytest.mark.slow
 def test_a_question_that_got_no_answer_is_taken_off_the_screen(child):
     link = child(
         "ready()\nfor word in words():\n    if word['kind'] == 'show': say(kind='failed', message='taken off')"

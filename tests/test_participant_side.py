@@ -75,6 +75,7 @@ def test_a_position_that_is_told_late_takes_no_question_off_the_participants_scr
     assert told.end() == ["ask-rating", "end"]
 
 
+@pytest.mark.slow
 def test_what_takes_a_question_off_the_participants_screen_stays_on_it(told: Told) -> None:
     for serial in range(0, 100, 2):
         told.at(serial, State.RATING)

@@ -87,6 +87,7 @@ def test_every_word_to_the_participant_comes_back_from_its_line_whatever_its_tex
     assert to_participant_from(wire) == word
 
 
+@pytest.mark.slow
 @given(FROM)
 def test_every_word_from_the_participant_comes_back_from_its_line_whatever_its_texts_hold(word):
     assert from_participant_from(line(word)) == word

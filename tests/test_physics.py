@@ -137,6 +137,7 @@ def test_every_shot_has_a_status_finite_numbers_and_its_events_in_order(gun):
     assert (summary.status == "no-break-away") == (summary.peak_force_N is None)
 
 
+@pytest.mark.slow
 @given(gun=ANY_GUN)
 @settings(max_examples=12, deadline=None, derandomize=True)
 def test_momentum_is_the_integral_of_the_force_on_the_hand(gun):
@@ -320,6 +321,7 @@ def test_a_number_that_physics_has_not_is_refused_by_name(field, value):
         GunParameters(**{field: value})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", NUMBERS)
 @pytest.mark.parametrize("value", [None, "1", True, 1j, [1.0], Decimal(1), 10**400])
 def test_a_parameter_of_the_wrong_kind_is_refused_by_name_value_and_rule(field, value):

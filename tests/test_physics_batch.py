@@ -43,6 +43,7 @@ def test_a_batch_gives_the_digits_of_single_shots(engine, drive_off):
             )
 
 
+@pytest.mark.slow
 def test_what_is_no_gun_is_invalid_and_spoils_no_other(engine):
     found = simulate_batch(magnet_mass_kg=[0.114, 0.0, math.nan, -1.0, math.inf], friction_N=0.21)
     assert found.names().tolist() == ["home", *["invalid"] * 4]
@@ -98,6 +99,7 @@ def test_without_the_compiler_a_compiled_shot_is_refused(monkeypatch):
         compiled_simulator()
 
 
+@pytest.mark.slow
 def test_a_batch_as_summaries_is_its_single_shots():
     found = simulate_batch(friction_N=[0.21, 1.12, 1.7]).summaries()
     assert [shot.status for shot in found] == ["home", "home", "stuck"]
@@ -105,6 +107,7 @@ def test_a_batch_as_summaries_is_its_single_shots():
     assert found[0].reset_end_s == pytest.approx(simulate(GunParameters()).reset_end_s, rel=1e-13)
 
 
+@pytest.mark.slow
 def test_a_session_never_loads_the_compiler():
     code = "import sys; from device.physics import *; simulate(GunParameters()); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

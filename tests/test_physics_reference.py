@@ -20,6 +20,7 @@ def test_every_number_of_the_summary_agrees_with_fifty_digits_to_a_part_in_a_mil
         assert getattr(found, name) == pytest.approx(float(digits), rel=1e-12, abs=0.0), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive_off", ["open", "shorted"])
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 def test_a_batch_of_two_hundred_random_guns_agrees_with_fifty_digits(engine, drive_off):

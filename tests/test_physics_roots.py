@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -41,6 +42,7 @@ def slope(c: list[float], s: Fraction) -> Fraction:
     return sum((n * Fraction(c[n]) * s ** (n - 1) for n in range(1, ORDER + 1)), Fraction(0))
 
 
+@pytest.mark.slow
 @given(coefficients())
 def test_what_is_said_to_fall_falls_everywhere(c: list[float]) -> None:
     assume(falls(c) > 0.0)
@@ -60,6 +62,7 @@ def test_what_is_no_number_is_not_said_to_fall() -> None:
         assert not falls(c) > 0.0
 
 
+@pytest.mark.slow
 @given(coefficients())
 def test_where_it_falls_the_root_is_that_of_the_search_in_the_bernstein_basis(c: list[float]) -> None:
     assume(falls(c) > 0.0)

@@ -80,6 +80,7 @@ def test_a_creeping_magnet_agrees_with_fifty_digits(row):
         assert getattr(found, name) == pytest.approx(float(digits), rel=1e-12, abs=0.0), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", SHOTS, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
 @pytest.mark.parametrize("name", ["magnet_mass_kg", "inductance_H"])
 def test_the_work_does_not_grow_with_the_stiffness(row, name):
@@ -90,6 +91,7 @@ def test_the_work_does_not_grow_with_the_stiffness(row, name):
         assert units < 2000  # in plain steps, thousands of the gun as it is and the more the lighter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("emf", RINGING)
 def test_a_magnet_that_rings_before_it_creeps_agrees_with_the_plain_series(emf, monkeypatch):
     gun = RINGING[emf]
@@ -102,6 +104,7 @@ def test_a_magnet_that_rings_before_it_creeps_agrees_with_the_plain_series(emf, 
     assert units < 0.4 * plain_units
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("emf", RINGING)
 def test_energy_and_momentum_of_a_magnet_that_rings_add_up(emf):
     audit = energy_balance(RINGING[emf])

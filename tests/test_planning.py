@@ -29,6 +29,7 @@ def by_place(plan, *, sets=False):
     return [list(some) for _, some in groupby(plan.trials, key)]
 
 
+@pytest.mark.slow
 @given(
     voltages=st.integers(1, 5),
     repetitions=st.integers(1, 6),
@@ -68,6 +69,7 @@ def test_each_cell_stands_equally_often_in_a_session_and_as_evenly_as_it_gets_in
             assert len(counts) == each
 
 
+@pytest.mark.slow
 @given(
     most=st.integers(1, 4),
     repetitions=st.integers(2, 12),
@@ -194,6 +196,7 @@ def test_catch_trials_have_no_level_that_varies():
     assert all(trial.levels == (("method", "a"),) for trial in caught)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**63 - 1), code=st.from_regex(r"[A-Za-z0-9]{1,8}", fullmatch=True))
 def test_the_same_comes_again_and_reads_back(seed, code):
     config = design(

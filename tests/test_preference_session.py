@@ -92,6 +92,7 @@ def test_0_is_a_rating_and_none_is_no_answer_and_both_are_answers(rating: float 
     assert driven({6: Answered(value=rating, by="participant")}) == STEPS
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.dictionaries(st.integers(0, 40), st.sampled_from([FELT, UNFELT]), max_size=10))
 def test_whatever_goes_wrong_each_method_is_felt_rated_and_described_once(troubles: dict[int, Outcome]) -> None:

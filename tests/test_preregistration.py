@@ -292,6 +292,7 @@ def test_a_rule_about_a_method_that_no_design_has_is_refused_before_it_is_frozen
         freeze(study, "", RealClock())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["detection", "grip", "hurry", "magnitude", "pairs", "preference", "realism", "stronger", "voltages"]
 )
@@ -308,6 +309,7 @@ def test_the_tests_that_are_announced_are_those_that_are_made(name: str) -> None
 # what differs
 
 
+@pytest.mark.slow
 def test_thirty_changed_keys_are_each_named_with_both_values(begun: Path) -> None:
     cases = [(file, *one) for file, keys in KEYS.items() for one in keys]
     assert len(cases) == 30
@@ -343,6 +345,7 @@ def test_a_comment_and_a_default_that_is_spelled_out_change_nothing(frozen: Path
     assert "nothing has changed" in freeze_status(frozen).lines()[0]
 
 
+@pytest.mark.slow
 def test_a_run_names_what_was_frozen_and_warns_of_what_has_changed(frozen: Path) -> None:
     sha256 = freeze_status(frozen).chain.every[0].sha256
     kept = [do(frozen, "P01"), do(frozen, "S01", person=False)]
@@ -359,6 +362,7 @@ def test_a_run_names_what_was_frozen_and_warns_of_what_has_changed(frozen: Path)
     ]
 
 
+@pytest.mark.slow
 def test_runs_before_the_freeze_and_the_people_are_told(study: Path) -> None:
     do(study, "P01")
     done = freeze(study, "", RealClock())
@@ -379,6 +383,7 @@ def test_runs_before_the_freeze_and_the_people_are_told(study: Path) -> None:
     assert [(one.what, one.who) for one in of_kind(found, "exclusion")] == [("excluded by hand: fell ill", ("P01",))]
 
 
+@pytest.mark.slow
 def test_who_came_beyond_the_planned_number_is_named_and_all_as_planned_is_no_deviation(study: Path) -> None:
     of_preference_alone(study, 1)
     do(study, "P01")
@@ -388,6 +393,7 @@ def test_who_came_beyond_the_planned_number_is_named_and_all_as_planned_is_no_de
     assert (beyond.frozen, beyond.instead, beyond.who) == (1, 2, ("P02",))
 
 
+@pytest.mark.slow
 def test_who_broke_off_has_not_finished_with_a_table_or_without(study: Path) -> None:
     of_preference_alone(study, 3)
     with_table, without, blank, _ = (do(study, code, person=False) for code in ("P01", "P02", "P03", "P04"))
@@ -401,6 +407,7 @@ def test_who_broke_off_has_not_finished_with_a_table_or_without(study: Path) -> 
     ]
 
 
+@pytest.mark.slow
 def test_a_run_whose_journal_cannot_be_read_is_named_and_so_is_its_log(study: Path) -> None:
     of_preference_alone(study, 3)
     used, not_used, _, _ = (do(study, code, person=False) for code in ("P01", "P02", "P03", "P04"))
@@ -427,6 +434,7 @@ def test_a_log_of_people_that_cannot_be_used_is_named_without_a_journal_too_and_
     assert [one.who for one in of_kind(told(study), "exclusion")] == [("P02",)]
 
 
+@pytest.mark.slow
 def test_who_finished_and_was_not_given_to_the_analysis_is_named(study: Path) -> None:
     of_preference_alone(study, 4)
     journals = [do(study, code, person=False) for code in ("P01", "P02", "P03", "P04")]
@@ -467,6 +475,7 @@ def test_other_rules_and_tests_than_were_frozen_are_told(begun: Path, tmp_path: 
     assert [one.what for one in none] == ["--rules was not given", "a frozen test that was not made"]
 
 
+@pytest.mark.slow
 def test_why_the_rules_leave_somebody_out_is_not_frozen_and_no_deviation(study: Path) -> None:
     person = '[[excluded]]\ncode = "P02"\nreason = "a seizure"\n'
     (study / "rules.toml").write_text(RULES + person)
@@ -485,6 +494,7 @@ def test_why_the_rules_leave_somebody_out_is_not_frozen_and_no_deviation(study: 
     assert "seizure" not in again.file.read_text() + again.page.read_text()
 
 
+@pytest.mark.slow
 def test_frozen_tests_are_made_unless_a_file_asks_for_others(study: Path) -> None:
     of_ratings = REQUEST.replace("direction", "preference")
     (study / "requests.toml").write_text(of_ratings + REQUEST)
@@ -620,6 +630,7 @@ def test_a_freeze_in_an_archive_is_held_against_the_journals_there(begun: Path) 
     assert preregistration_faults(begun)[0].startswith("preregistration/preregistration-1.json: was edited")
 
 
+@pytest.mark.slow
 def test_an_archive_is_not_held_against_a_freeze_that_stands_elsewhere_in_it(begun: Path, tmp_path: Path) -> None:
     archive = tmp_path / "archive"
     export_archive(ArchiveRequest(folder=begun, out=archive, include_synthetic=True))
@@ -633,6 +644,7 @@ def test_a_freeze_that_is_no_json_object_is_named(frozen: Path, whole: str) -> N
     assert said.startswith(f"{frozen / 'preregistration-2.json'}: was edited, or is of another version")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", ["NaN", "-Infinity", "1e999"])
 def test_a_freeze_with_what_is_no_number_ends_no_command(begun: Path, number: str) -> None:
     path = begun / "preregistration-1.json"

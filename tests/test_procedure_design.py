@@ -137,6 +137,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tables", "changes", "words"), REFUSED, ids=[words[:40] for _, _, words in REFUSED])
 def test_what_cannot_be_is_refused_by_name(tables: dict[str, Any], changes: dict[str, Any], words: str) -> None:
     assert words in said(tables, changes)

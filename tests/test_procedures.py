@@ -56,6 +56,7 @@ def up_downs(draw: some.DrawFn) -> UpDown:
     )
 
 
+@pytest.mark.slow
 @given(up_downs(), some_answers)
 def test_a_track_stays_in_its_range_on_its_grid_and_stops_when_it_is_told(rule: UpDown, answers: list[bool]) -> None:
     found = track_after(rule, answers)
@@ -67,6 +68,7 @@ def test_a_track_stays_in_its_range_on_its_grid_and_stops_when_it_is_told(rule: 
     assert (found.next_level is None) == rule.stop.reached(len(found.levels), len(found.reversals))
 
 
+@pytest.mark.slow
 @given(up_downs(), some_answers, some.data())
 def test_what_comes_next_is_that_of_the_answers_however_they_came(
     rule: UpDown, answers: list[bool], data: some.DataObject
@@ -139,6 +141,7 @@ def test_shrinking_steps_come_to_their_target_on_a_coarse_grid_too() -> None:
     assert np.mean(last) == pytest.approx(norm.ppf(0.75), abs=0.25)
 
 
+@pytest.mark.slow
 @given(up_downs(), some_answers)
 def test_a_track_of_somebody_is_that_of_their_answers(rule: UpDown, answers: list[bool]) -> None:
     """Somebody who answers so, trial by trial: the same track, and asked no oftener than it goes on."""
@@ -210,11 +213,13 @@ def by_hand(trials: list[tuple[int, bool]]) -> np.ndarray:
     return weights / weights.sum()
 
 
+@pytest.mark.slow
 @given(some_trials)
 def test_a_posterior_is_prior_times_likelihood(trials: list[tuple[int, bool]]) -> None:
     assert after(trials).reshape(KNOWN.prior.shape) == pytest.approx(by_hand(trials), rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.slow
 @given(some_trials, some.sampled_from([("threshold",), ("width",), ("threshold", "width")]))
 def test_the_variance_rule_takes_what_leaves_the_least_variance(
     trials: list[tuple[int, bool]], wanted: tuple[posterior.WantedParameter, ...]
@@ -240,6 +245,7 @@ def variance_left(known: np.ndarray, stimulus: int, wanted: posterior.WantedPara
     return float(left / scale)
 
 
+@pytest.mark.slow
 @given(some_trials)
 def test_the_entropy_rule_takes_what_tells_most(trials: list[tuple[int, bool]]) -> None:
     known = after(trials)
@@ -270,6 +276,7 @@ def test_many_observers_at_once_are_each_their_own() -> None:
         assert rule.gains(many)[person] == pytest.approx(rule.gains(own), rel=1e-9)
 
 
+@pytest.mark.slow
 @given(some_trials, some.sampled_from(["threshold", "width", "lapse", "guess"]))
 def test_quantiles_are_those_of_the_marginal_with_each_value_spread_over_its_cell(
     trials: list[tuple[int, bool]], name: str

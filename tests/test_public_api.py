@@ -184,6 +184,7 @@ assert not unused - {"matplotlib", "fontTools"} & set(sys.modules), "analyze"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.slow
 def test_the_statistics_of_any_design_are_a_frame_and_a_table_in_a_notebook(tmp_path: Path) -> None:
     recoil.run_synthetic(recoil.load_config("realism"), ["P01", "P02", "P03"], tmp_path, seed=1)
     found = recoil.analyze(tmp_path)

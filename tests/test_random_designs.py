@@ -118,6 +118,7 @@ def check_rows(config, plan, told):
         assert row["attempts"] >= 1
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(tables())
 def test_a_design_is_refused_in_words_or_planned_as_it_states(given_tables):

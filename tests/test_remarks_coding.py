@@ -141,6 +141,7 @@ def test_analyze_counts_the_codes_of_logs(recoil: Recoil, tmp_path: Path) -> Non
     assert (refused.returncode, "P77" in refused.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_the_example_counts_what_was_said_to_any_question_in_words(tmp_path: Path) -> None:
     setup = load_setup("preference")
     assert setup.laws is not None
@@ -160,6 +161,7 @@ def test_the_example_counts_what_was_said_to_any_question_in_words(tmp_path: Pat
     assert set(said["participant_id"]) <= set(real["participants"])
 
 
+@pytest.mark.slow
 def test_only_who_is_analysed_is_counted_and_coded(tmp_path: Path) -> None:
     write_study(tmp_path / "logs", participants=4, seed=1)
     ratings = next((tmp_path / "logs").rglob("*P02*_ratings.csv"))

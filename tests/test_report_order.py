@@ -33,6 +33,7 @@ def answered(folder: Path, people: int, source: str, gun: str) -> ReportData:
     return report_of(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("people", "source", "gun", "said"),
     [

@@ -62,6 +62,7 @@ def of_designs(*names: str) -> Logs:
     return Logs(trials=empty, ratings=empty, paths=(), problems=(), designs=tuple(designs))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["grip", "hurry", "magnitude", "preference", "realism", "stronger", "voltages"])
 def test_what_a_request_may_name_is_known_before_there_are_data(name: str) -> None:
     design, _ = loaded(name)
@@ -159,6 +160,7 @@ def test_a_linear_model_of_right_and_wrong_says_that_another_is_meant_for_them(l
     assert '`kind = "logistic"`' in one.note
 
 
+@pytest.mark.slow
 def test_what_data_that_are_kept_apart_have_not_is_a_warning_and_the_rest_is_answered(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -181,11 +183,13 @@ def test_what_data_that_are_kept_apart_have_not_is_a_warning_and_the_rest_is_ans
         assert any("not answered here: " in warning for warning in apart["synthetic"].warnings) is said
 
 
+@pytest.mark.slow
 def test_a_report_without_requests_has_none(logs: Logs) -> None:
     assert summarize(logs).requested is None
     assert [*requested_sections(ReportData(title="x", statistics=summarize(logs)))] == []
 
 
+@pytest.mark.slow
 def test_a_design_is_asked_by_question_cells_and_terms(tmp_path: Path) -> None:
     text = """
 [[requests]]
@@ -225,6 +229,7 @@ def test_numbers_are_asked_as_their_logarithms() -> None:
     assert np.exp(found.trials["score"]).round(6).tolist() == found.trials["strength"].round(6).tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -156,6 +156,7 @@ def stops(*_: object) -> None:
     raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("where", "what"), [(sections, "write_page"), (feature, "_tables"), (feature, "_analysis")])
 def test_an_interrupted_analysis_leaves_the_one_before_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: object, what: str

@@ -127,6 +127,7 @@ def _within_its_error(bf10: float | None, theirs: Entry) -> None:
     assert abs(bf10 / theirs["bf10"] - 1.0) < 4.0 * theirs["error"] + 1e-6
 
 
+@pytest.mark.slow
 @_both("within", "bayes")
 def test_the_bayes_factor_within_people_is_that_of_anovaBF(data: Entry, found: Entry) -> None:
     _within_its_error(rm_anova_bayes_factor(data["scores"]).bf10, found["bayes"])
@@ -156,6 +157,7 @@ def _compare_coefficients(ours: tuple[Coefficient, ...], theirs: Entry) -> None:
     assert [one.se for one in ours] == pytest.approx(theirs["se"], abs=CLOSE)
 
 
+@pytest.mark.slow
 @EVERY_TRIAL_SET
 def test_the_random_intercept_logit_is_glmer_with_25_nodes(data: Entry, found: Entry) -> None:
     who, answers, _, predictors = _model(data)
@@ -164,6 +166,7 @@ def test_the_random_intercept_logit_is_glmer_with_25_nodes(data: Entry, found: E
     assert ours.person_sd == pytest.approx(found["logit"]["person_sd"], abs=CLOSE)
 
 
+@pytest.mark.slow
 @EVERY_TRIAL_SET
 def test_the_linear_mixed_model_is_lmer_by_reml(data: Entry, found: Entry) -> None:
     who, _, values, predictors = _model(data)

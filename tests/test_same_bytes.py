@@ -57,6 +57,7 @@ def test_hands_that_answered_equally_often_stand_in_one_order() -> None:
     assert list(origin_of(rows, "hand").guns) == list(origin_of(rows[::-1], "hand").guns) == ["a", "b"]
 
 
+@pytest.mark.slow
 def test_files_are_read_in_one_order_whatever_the_order_they_are_named_in(sites: list[Path]) -> None:
     files = [path for site in sites for path in site.rglob("*_trials.csv")]
     found, other = find_logs(files), find_logs([*files[::-1], files[0]])

@@ -192,6 +192,7 @@ def a_session(gun: MessageBasedResource) -> None:
     assert gun.query("STAT?").startswith("STAT DISARMED,1,")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tcp", [False, True], ids=["line", "TCP"])
 def test_pyvisa_drives_the_twin(tmp_path: Path, tcp: bool) -> None:
     with a_twin(tmp_path, speed=1.0, tcp=tcp, rested=True) as (_, socket):
@@ -200,6 +201,7 @@ def test_pyvisa_drives_the_twin(tmp_path: Path, tcp: bool) -> None:
             a_session(gun)
 
 
+@pytest.mark.slow
 def test_the_program_of_the_page_fires_whenever_it_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (program,) = re.findall(r"```python hardware\n(.*?)```", DRIVER.read_text(encoding="utf-8"), re.DOTALL)
     with a_twin(tmp_path, speed=1.0, tcp=True, rested=True) as (_, socket):

@@ -55,6 +55,7 @@ def clock_heard(delays: list[float], lines_s: float, drift: float) -> tuple[floa
     return float(line.host_s(np.array([500.0 + now_s * (1 + drift)]))[0]) - now_s, line.u_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drift", [0.0, 5e-5, -4e-3])
 @pytest.mark.parametrize("batch_s", [0.005, 0.02, 0.2])
 def test_a_sensor_s_clock_is_known_by_what_came_soonest_in_batches_of_any_length(batch_s: float, drift: float):
@@ -201,6 +202,7 @@ def open_sensor(rest, clock):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("source", "said"),
     [

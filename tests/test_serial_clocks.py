@@ -21,6 +21,7 @@ def gun_us(host_s, drift_ppm):
     return int((host_s - GUN_BOOT_S) * (1e6 + drift_ppm))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drift_ppm", [-100.0, 0.0, 30.0, 100.0])
 @pytest.mark.parametrize("every_s", [0.011, 0.25])
 def test_after_fifty_exchanges_with_jitter_a_tick_is_known_below_a_millisecond(drift_ppm, every_s):

@@ -126,6 +126,7 @@ def test_a_shot_that_waits_and_whose_answer_is_lost_is_looked_for_until_it_has_e
     assert abs(report.pulse_start_s - true.start_s) <= report.timing.uncertainty_s + 5e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shot", "message"),
     [

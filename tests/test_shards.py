@@ -180,6 +180,7 @@ FAULTS: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_shards_that_do_not_make_one_run_are_named_and_nothing_is_written(fault: str, mine: Path) -> None:
     spoil, said = FAULTS[fault]

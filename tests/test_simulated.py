@@ -149,6 +149,7 @@ def test_a_serial_port_that_is_not_there_is_a_link_error_that_names_it():
         open_gun("serial:/dev/no-such-port")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["", "usb", "Simulated", "COM3"])
 def test_an_address_of_another_form_is_refused_with_the_forms(address):
     with pytest.raises(ValueError, match=r'"simulated" or "serial:PORT"'):

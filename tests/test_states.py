@@ -203,6 +203,7 @@ def test_while_a_correction_is_open_nothing_moves_the_step_but_the_participants_
     assert all(after_on(stack, kind) == (S.SAVING, S.CORRECTING) for kind in own)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*ACTS, *CARRY_ON])
 @pytest.mark.parametrize("state", [S.PAUSED, S.CORRECTING, S.SAVING, S.FIRING, S.HALTED, S.STOPPED])
 def test_what_carries_a_run_on_is_not_taken_where_it_is_held_or_busy(kind: Kind, state: State) -> None:
@@ -285,6 +286,7 @@ STEP_S = st.integers(0, 10_000).map(lambda ms: ms / 1000)
 PAUSES = st.lists(st.tuples(STEP_S, STEP_S, STEP_S), max_size=4)
 
 
+@pytest.mark.slow
 @given(began_s=st.integers(0, 1000).map(float), pauses=PAUSES, corrected=st.lists(st.booleans(), min_size=4))
 def test_the_end_of_a_break_is_put_off_by_the_time_of_its_pauses_also_with_a_correction_opened_there(
     began_s: float, pauses: list[tuple[float, float, float]], corrected: list[bool]

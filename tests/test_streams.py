@@ -124,6 +124,7 @@ def test_below_one_is_zero() -> None:
     assert Stream(1, "one").below(1) == 0
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.lists(st.integers(), max_size=30), st.integers(0, MAX_SEED))
 def test_a_shuffle_is_a_permutation_and_leaves_the_given_list_alone(items: list[int], seed: int) -> None:

@@ -81,6 +81,7 @@ def test_the_tail_lies_between_that_of_one_pair_and_the_sum_over_all_pairs(q: fl
     assert one - slack <= studentized_range_logsf(q, k, df) <= one + math.log(k * (k - 1) / 2) + slack
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", KS)
 @pytest.mark.parametrize("df", DFS)
 def test_a_larger_q_is_never_likelier(k: int, df: float) -> None:
@@ -95,6 +96,7 @@ def test_a_larger_q_is_never_likelier(k: int, df: float) -> None:
     assert (np.diff(mixed) <= 0.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", KS)
 @pytest.mark.parametrize("df", DFS)
 def test_isf_undoes_sf(k: int, df: float) -> None:

@@ -218,6 +218,7 @@ everyone = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(everyone)
 def test_nobody_comes_before_someone_in_progress_and_no_more_come_than_planned(drawn: list[Any]) -> None:
     people = [someone(f"P{n:02d}", a, b, excluded="left" if out else None) for n, a, b, out in drawn]
@@ -291,6 +292,7 @@ def test_a_drop_out_gives_the_row_back_and_a_readmitted_one_takes_it_again(tmp_p
     assert used_rows(tmp_path, "preference", read_register(tmp_path)) == [0, 1, 2]
 
 
+@pytest.mark.slow
 def test_two_consoles_that_begin_at_once_get_rows_of_their_own(tmp_path: Path) -> None:
     setup, other_stands = direction_with(order={"sessions": "williams"}), threading.Event()
 

@@ -87,6 +87,7 @@ def is_reading(node: ast.AST, names: set[str]) -> bool:
             return any(is_reading(one, names) for one in ast.iter_child_nodes(node))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_no_assertion_compares_with_a_clock(path: Path) -> None:
     found = clock_assertions(path.read_text(encoding="utf-8"), path.stem)

@@ -74,6 +74,7 @@ def test_a_threshold_follows_a_line_and_stays_above_its_floor(
     assert (there - here) * rise >= 0
 
 
+@pytest.mark.slow
 @given(some.lists(some.tuples(some.integers(0, 5), some.booleans()), max_size=8))
 def test_without_a_rise_it_is_the_grid_of_one_dimension(trials: list[tuple[int, bool]]) -> None:
     """The other dimension then changes nothing: stimuli with the same level are told apart by nothing."""

@@ -52,6 +52,7 @@ def test_any_text_is_read_back_and_never_starts_like_a_formula(text: str) -> Non
     assert not guard(text).startswith(FORMULA_STARTS)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.lists(st.tuples(anything | awkward, anything | awkward), max_size=5))
 def test_any_comment_and_note_survive_the_table(texts: list[tuple[str, str]]) -> None:

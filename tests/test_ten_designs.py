@@ -41,6 +41,7 @@ def people(name, count=1):
         yield design, plan, SyntheticParticipant(design, laws, plan, gun)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRIALS)
 def test_it_fits_its_gun_and_its_people_answer_every_question(name):
     design, gun, laws = loaded(name)
@@ -71,6 +72,7 @@ def means(name, question, key, count=60):
     return {level: statistics.fmean(values) for level, values in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [250, pytest.param(1000, marks=pytest.mark.soak)])
 def test_rates_are_met_in_the_mean_over_people(count):
     found = means("direction", "response", lambda trial: (trial.level("method"), trial.level("direction")), count)
@@ -78,6 +80,7 @@ def test_rates_are_met_in_the_mean_over_people(count):
     assert found["asymmetric-2", "backward"] == pytest.approx(0.929, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_psychometric_function_rises_from_chance_to_its_lapses():
     found = means("voltages", "response", lambda trial: trial.level("voltage_V"))
     assert found[6.0] == pytest.approx(0.5 + 0.48 * 0.041, abs=0.06)
@@ -94,11 +97,13 @@ def test_a_law_without_a_value_for_catch_trials_is_refused_with_what_they_are_ca
         check_laws(setup.config, laws_of(setup), [plan_of(setup.config, "P01", 1)])
 
 
+@pytest.mark.slow
 def test_catch_trials_are_falsely_felt_as_often_as_is_said():
     found = means("detection", "felt", lambda trial: trial.catch, 40)
     assert 1 - found[True] == pytest.approx(0.1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_who_is_worth_more_is_chosen_more_often():
     chosen = defaultdict(int)
     for _, plan, person in people("pairs", 60):

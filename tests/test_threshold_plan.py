@@ -33,6 +33,7 @@ def test_every_procedure_stays_at_levels_that_may_be_felt(procedure: str) -> Non
     assert np.abs(steps - steps.round()).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_what_adapts_ends_nearer_the_threshold_than_it_began() -> None:
     for procedure in ("2-down-1-up", "3-down-1-up", "posterior"):
         made = answers_by(procedure, PEOPLE, LEVELS, 40, np.random.default_rng(3))
@@ -44,6 +45,7 @@ def test_constant_stimuli_are_as_often_in_every_block() -> None:
     assert all(sorted(row[:6]) == sorted(row[6:]) == list(LEVELS) for row in made.levels.tolist())
 
 
+@pytest.mark.slow
 def test_each_procedure_and_number_of_trials_has_its_figures(found: ThresholdPower) -> None:
     assert [(one.procedure, one.trials) for one in found.procedures] == [
         (name, count) for name in procedures("right") for count in (10, 20)
@@ -55,6 +57,7 @@ def test_each_procedure_and_number_of_trials_has_its_figures(found: ThresholdPow
     assert again.to_frame().shape == (4, 9)
 
 
+@pytest.mark.slow
 def test_a_plan_says_which_procedure_to_take_and_what_was_assumed(found: ThresholdPower, tmp_path: Path) -> None:
     assert plan_in_short(found).items[0].startswith(f"10 trials (3 min): take {found.best['10']} (interval ")
     parts = sections_of_plan(found, tmp_path)

@@ -139,6 +139,7 @@ def test_answers_that_never_rise_have_no_threshold_and_say_so(config: DesignConf
     assert one.conditions[0].group.without == 1
 
 
+@pytest.mark.slow
 def test_a_share_that_falls_with_the_level_is_fitted_as_one(config: DesignConfig, of_two: pd.DataFrame) -> None:
     turned = of_two.assign(voltage_V=20.0 - of_two["voltage_V"])
     rising, falling = thresholds(config, "response", of_two), thresholds(config, "response", turned)
@@ -196,6 +197,7 @@ def shipped() -> dict[str, Any]:
     return made
 
 
+@pytest.mark.slow
 def test_yes_counts_with_the_catch_trials_as_guesses(shipped: dict[str, Any]) -> None:
     found = shipped["detection"].questions["felt"].thresholds
     assert (found.share, found.guess) == ("yes", None)
@@ -232,6 +234,7 @@ def test_what_has_no_success_or_no_single_function_is_not_fitted() -> None:
     assert "both sides of the standard, 14" in refused.reason
 
 
+@pytest.mark.slow
 def test_the_pages_have_groups_differences_people_and_a_panel_each(
     config: DesignConfig, of_two: pd.DataFrame, tmp_path: Any
 ) -> None:
@@ -247,6 +250,7 @@ def test_the_pages_have_groups_differences_people_and_a_panel_each(
     assert (tmp_path / "functions.png").is_file()
 
 
+@pytest.mark.slow
 def test_a_mean_says_of_how_many_people_it_is_where_some_were_not_fitted(
     config: DesignConfig, of_two: pd.DataFrame
 ) -> None:
@@ -259,6 +263,7 @@ def test_a_mean_says_of_how_many_people_it_is_where_some_were_not_fitted(
     assert "people)" not in next(threshold_sentences(whole, whole.questions["response"]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("people", [1, 4, 6])
 @pytest.mark.parametrize("methods", [1, 2])
 def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
@@ -286,6 +291,7 @@ def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
         assert all(0 <= box.x0 < box.x1 <= figure.bbox.width for box in legends)
 
 
+@pytest.mark.slow
 def test_conditions_are_told_apart_without_colours(
     config: DesignConfig, of_two: pd.DataFrame, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -305,6 +311,7 @@ def test_conditions_are_told_apart_without_colours(
     assert "those of one level side by side" in section.pictures[0].caption
 
 
+@pytest.mark.slow
 def test_few_levels_have_each_a_tick_below_their_functions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     config = load_setup("detection").config
     shown: list[Figure] = []
@@ -356,6 +363,7 @@ def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -
     assert (tmp_path / "tracks.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_tracks_call_conditions_as_the_design_does(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     tables = load_setup("threshold").config.model_dump()
     grips = {"levels": ("one", "both"), "labels": {"one": "with one hand", "both": "with both hands"}}

@@ -66,6 +66,7 @@ def test_the_between_subjects_test_agrees_with_scipy_on_unequal_groups() -> None
         assert (c.ci_low, c.ci_high) == pytest.approx((intervals.low[c.a, c.b], intervals.high[c.a, c.b]), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-300, 1e-160, 1.0, 1e154, 1e295])
 @pytest.mark.parametrize("offset", [0.0, 1e6, 1e12])
 def test_q_has_fourteen_digits_of_the_exact_one_at_any_offset_and_scale(offset: float, scale: float) -> None:

@@ -55,6 +55,7 @@ def test_a_script_gives_the_same_transcript_again_and_reaches_every_error():
     assert seen >= set(WireError) - {WireError.QUEUE_OVERFLOW}
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.binary(max_size=400), st.integers(0, 3_000_000)), max_size=8), st.booleans())
 def test_whatever_bytes_come_the_core_answers_in_bounds_and_still_knows_its_name(pieces, strict):
     gun = Strict() if strict else Hand()

@@ -124,6 +124,7 @@ def test_any_line_is_a_frame_or_a_link_error(line, sender):
     assert encode(frame, sender) == line + b"\n"
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.text(max_size=300) | BODIES)
 @example("٣")

@@ -183,6 +183,7 @@ def test_no_statistic_is_forgotten() -> None:
         assert set(arguments) == set(inspect.signature(getattr(analysis, name)).parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STATISTICS)
 def test_what_no_statistic_takes_is_refused_by_the_name_of_its_argument(name: str) -> None:
     for argument in STATISTICS[name]:
@@ -193,6 +194,7 @@ def test_what_no_statistic_takes_is_refused_by_the_name_of_its_argument(name: st
             assert len(said or "") < 500, f"{argument} is {what}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STATISTICS)
 def test_what_a_statistic_takes_or_not_is_no_other_error(name: str) -> None:
     any_argument = re.compile(rf"\b({'|'.join(STATISTICS[name])})\b")
@@ -218,6 +220,7 @@ def refused(function: Callable[..., object], positional: tuple[str, ...], argume
     return str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OF_NOTEBOOKS)
 def test_what_no_function_of_a_notebook_takes_is_refused_by_the_name_of_its_argument(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
