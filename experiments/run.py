@@ -41,7 +41,7 @@ from experiments.session.steps import Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
-from experiments.written_tables import tables_of_stopped, write_tables
+from experiments.written_tables import tables_of_finished, tables_of_stopped
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -312,4 +312,4 @@ def _to_the_end(
     contents = desk.live.journal.read_back()
     hashes = {"table_sha256": hashlib.sha256(table(contents)).hexdigest(), "journal_sha256": contents.sha256}
     desk.live.journal.append("finished", **hashes)
-    return write_tables(place, contents)
+    return tables_of_finished(place, contents)

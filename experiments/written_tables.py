@@ -8,7 +8,7 @@ from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import Contents
 from experiments.session.steps import Answered
-from experiments.study.folders import Place
+from experiments.study.folders import Place, PlaceError
 
 
 def write_tables(place: Place, contents: Contents) -> int:
@@ -22,17 +22,30 @@ def write_tables(place: Place, contents: Contents) -> int:
     return answers_in(contents)
 
 
+def tables_of_finished(place: Place, contents: Contents) -> int:
+    """As `write_tables`, of a run that is finished. `PlaceError`: they cannot be written, by which nothing is lost."""
+    try:
+        return write_tables(place, contents)
+    except OSError as error:
+        raise PlaceError(f"the run is finished, and {_unwritten(place, error)}") from error
+
+
 def tables_of_stopped(place: Place, contents: Contents, why: str) -> int:
     """As `write_tables`, of a run that was stopped. `RunStopped`: they cannot be written, by which nothing is lost."""
     try:
         return write_tables(place, contents)
     except OSError as error:
-        stop = RunStopped(
-            f"{why}; every answer is in the journal, but its table could not be written ({place.table}: "
-            f"{error.strerror}): free some space, and `recoil rebuild {place.journal}` writes it"
-        )
+        stop = RunStopped(f"{why}; {_unwritten(place, error)}")
         stop.saved = answers_in(contents)
         raise stop from error
+
+
+def _unwritten(place: Place, error: OSError) -> str:
+    mend = "free some space" if error.errno in storage.FULL else "see to that"
+    return (
+        f"every answer is in the journal, but its table could not be written ({error.filename or place.table}: "
+        f"{error.strerror}): {mend}, and `recoil rebuild {place.journal}` writes it"
+    )
 
 
 def answers_in(contents: Contents) -> int:

@@ -20,7 +20,7 @@ from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
 from experiments.session.steps import Outcome, Step
-from experiments.study.folders import place
+from experiments.study.folders import PlaceError, place
 from experiments.synthetic.answers import synthetic_participant_of
 from tests.designs import changed
 from tests.journals import raw
@@ -299,3 +299,13 @@ def test_the_gun_is_closed_and_the_journal_let_go_after_a_run(tmp_path: Path) ->
     done = run(request, synthetic_screen, VirtualClock())
     with closing(Journal.reopen(read_journal(done.place.journal), VirtualClock())) as journal:
         assert journal.path == done.place.journal
+
+
+def test_a_finished_run_whose_table_cannot_be_written_says_that_nothing_is_lost(tmp_path: Path) -> None:
+    where = place(tmp_path, "P01", "preference")
+    where.table.mkdir(parents=True)  # nothing can be put there, as in a folder that is for reading alone
+    request = RunRequest(setup=SETUPS["preference"], participant_id="P01", results=tmp_path, seed=1)
+    said = r"the run is finished, and every answer is in the journal, but its table .* see to that, and `recoil rebuild"
+    with pytest.raises(PlaceError, match=said):
+        run(request, synthetic_screen, VirtualClock())
+    assert read_journal(where.journal).finished

@@ -7,7 +7,6 @@ hash of that record's line (`link_of`): a record changed by hand breaks the chai
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
@@ -37,7 +36,6 @@ ENDING = storage.JOURNAL_ENDING
 MOST_LINE, MOST_BYTES = 1 << 26, 1 << 29
 """No record is longer, and no journal: a run of ten thousand trials writes some ten million bytes."""
 _NOTHING = "nothing was recorded"
-_FULL = (errno.ENOSPC, errno.EDQUOT)
 _PATIENCE_S = 0.5
 """How long a journal is tried that somebody may only be looking at."""
 
@@ -229,7 +227,7 @@ class Journal:
             self._take_back()
             reason = error.strerror if isinstance(error, OSError) else error
             safe = f"everything up to record {self._count - 1} is safe on the disk" if self._count else _NOTHING
-            if getattr(error, "errno", None) in _FULL:
+            if getattr(error, "errno", None) in storage.FULL:
                 safe += "; free some space there, then go on with --resume"
             raise JournalError(f"{self.path}: record {self._count} cannot be written ({reason}); {safe}") from error
         self._synced_s = self._clock.now() if self._each else None

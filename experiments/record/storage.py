@@ -22,6 +22,8 @@ from device.machine_clock import machine_s
 OWNER_FILE = 0o600
 OWNER_FOLDER = 0o700
 JOURNAL_ENDING = "_journal.jsonl"
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""The numbers of a system's errors that say that a disk is full."""
 
 
 def make_folder(folder: Path) -> None:
