@@ -38,8 +38,8 @@ class Train:
 
     def __init__(self, step: steps.Present, desk: Desk) -> None:
         self._step, self._desk, self._live = step, desk, desk.live
-        self._onset_utc, self._onset_s = "", math.nan
-        self.shots = self._tick = 0
+        self._onset_utc, self._onset_s, self._last_s = "", math.nan, math.nan
+        self.shots = 0
 
     def began(self, onset_utc: str, first: ShotReport) -> None:
         """Take the first shot; `next` counts after the least exposure."""
@@ -49,7 +49,7 @@ class Train:
 
     def fired(self, report: ShotReport) -> None:
         """Have a shot on the disk."""
-        self.shots += 1
+        self.shots, self._last_s = self.shots + 1, report.pulse_start_s
         shot = steps.TrainShot(
             shot=self.shots,
             requested_s=report.requested_s,
@@ -63,10 +63,10 @@ class Train:
 
     def due_s(self) -> float:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
-        # what went by while this machine stood still is left out: made up for, it would be fired faster than planned
-        gone_by = int((self._live.clock.now() - self._onset_s) / self._step.repeat_every_s)
-        self._tick = gone_by + 1 if gone_by > self._tick + 1 else self._tick + 1
-        tick_s = self._onset_s + self._tick * round(self._step.repeat_every_s * 1e6) / 1e6
+        # ticks that went by while this machine stood still are left out, and one that would follow a late shot too soon
+        every_us, begun_s = round(self._step.repeat_every_s * 1e6), self._onset_s
+        earliest_s = max(self._live.clock.now(), self._last_s + self._step.repeat_every_s - LEAD_S)
+        tick_s = begun_s + math.ceil((earliest_s - begun_s) * 1e6 / every_us) * every_us / 1e6
         return max(tick_s, self._live.gun.status().ready_at_s)
 
     def presented(self, ended_by: Literal["next", "limit"]) -> steps.Presented:

@@ -89,20 +89,24 @@ def test_a_shot_whose_magnet_is_not_home_by_its_tick_waits_for_it(tmp_path: Path
     assert all(start >= home + 1_100_000 for (_, home), (start, _) in pairwise(starts_homes_us))
 
 
-def test_shots_that_a_standstill_of_the_machine_held_up_are_not_made_up_for(tmp_path: Path) -> None:
+@pytest.mark.parametrize("stood_s", [0.5, 1.6, 3.4, 3.9])
+def test_shots_that_a_standstill_of_the_machine_held_up_are_not_made_up_for(tmp_path: Path, stood_s: float) -> None:
+    """None follows another sooner than the design says, but for what a machine may be late without a standstill."""
+
     class StandsStill(ListeningGun):
         def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
             if len(self.reports) == 2:
-                self.clock.sleep(3.4)
+                self.clock.sleep(stood_s)
             return super().fire(shot, at_s)
 
     desk, gun = listening(tmp_path, kind=StandsStill)
     desk.carry_out()
-    first, _, late, *others = gun.reports[: int(desk.rows()[0]["shots"])]
-    ticks = [one.pulse_start_s - first.pulse_start_s for one in others]
-    assert late.pulse_start_s - first.pulse_start_s == pytest.approx(2.0 - LEAD_S + 3.4, abs=1e-6)
-    assert ticks == pytest.approx([6.0 + number for number in range(len(ticks))], abs=1e-6)
-    assert ticks
+    starts = [one.pulse_start_s - gun.reports[0].pulse_start_s for one in gun.reports[: int(desk.rows()[0]["shots"])]]
+    first_tick = math.ceil(3.0 - 2 * LEAD_S + stood_s)
+    assert starts[2] == pytest.approx(2.0 - LEAD_S + stood_s, abs=1e-6)
+    assert starts[3:] == pytest.approx([first_tick + number for number in range(len(starts[3:]))], abs=1e-6)
+    assert starts[3:]
+    assert min(later - sooner for sooner, later in pairwise(starts)) >= 1.0 - LEAD_S - 1e-6
 
 
 def test_every_shot_of_a_train_is_in_the_journal_with_its_times(tmp_path: Path) -> None:
