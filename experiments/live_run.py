@@ -303,14 +303,16 @@ class LiveRun:
         self.journal.append("outcome", body=step_record(Interrupted(presented=felt)))
 
     def go_on(self, session: Session, outcome: Outcome) -> Step | None:
-        """The session's next step, which the journal has when this returns; `None` at its end.
+        """The session's next step, which the journal has when this returns; `None` at its end. `RunStopped`, as `wait`.
 
-        Made and written under the lock: a correction lies before it, and counts for it, or behind it.
+        Made and written under the lock: a correction lies before it, and counts for it, or behind it. A step of a run
+        that was stopped is not written: it may follow from a correction that the disk refused.
         """
         with self.news:
             step = step_after(session, outcome)
             if step is None:
                 return None
+            self._check()
             written = self.journal.submit("step", body=step_record(step))
         written.result()
         return step

@@ -1297,3 +1297,25 @@ def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_
         contents = of_journal(sitting)
     assert [one.value for one in remarks(contents, EntryCorrected)] == ["backward"] * halted
     assert contents.records[-1].reason == (EMERGENCY if halted else CORRECTION_UNSAVED)
+
+
+def test_no_step_follows_from_a_correction_that_cannot_be_written_also_if_the_answer_was_already_taken(
+    tmp_path: Path,
+) -> None:
+    with sat(DIRECTION, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
+
+        def full_once(descriptor: int) -> None:
+            disk.undo()
+            full(descriptor)
+
+        sitting.to(S.ASKING)
+        assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
+        sitting.to(S.ASKING)
+        assert by_hand(sitting, events.Undo())
+        disk.setattr(storage, "sync", full_once)
+        with at_one_instant(sitting):
+            assert sitting.live.offer(events.Correct(value="backward"))
+            assert sitting.live.offer(own_key(sitting, response="forward"))
+        contents = of_journal(sitting)
+    assert [record.kind for record in contents.records[-2:]] == ["outcome", "stopped"]
+    assert [response for _, _, response in raw_answers(contents)] == ["forward", "forward"]
