@@ -154,6 +154,24 @@ def test_a_group_draws_its_people_towards_each_other_by_how_little_they_say() ->
     assert group.mean.low < 12 < group.mean.high
 
 
+@pytest.mark.parametrize(("people", "own_sd"), [(2, 0.05), (3, 0.5), (14, 0.3), (14, 2.0), (60, 0.3)])
+def test_a_group_is_that_of_normal_values_known_with_normal_errors(people: int, own_sd: float) -> None:
+    """There the posterior of the mean and SD is a sum over a plane, without draws, cells and ends."""
+    centres = norm.ppf((np.arange(people) + 0.5) / people)
+    own = norm.ppf((np.arange(4000) + 0.5) / 4000) * own_sd
+    found = pooled_group([centre + own for centre in centres])
+    mean, sd = np.linspace(-30, 30, 12_001)[:, None], np.geomspace(1e-3, 100, 300)
+    spread = np.hypot(sd, own_sd)
+    log_density = sum(norm.logpdf(centre, mean, spread) for centre in centres)
+    log_density += np.log(sd / (1 + (sd / centres.std(ddof=1)) ** 2))
+    weights = np.exp(log_density - log_density.max())
+    of_mean, of_sd = np.cumsum(weights.sum(axis=1)), np.cumsum(weights.sum(axis=0))
+    low, high = np.interp([0.025, 0.975], of_mean / of_mean[-1], mean[:, 0])
+    assert (found.mean.low, found.mean.high) == pytest.approx((low, high), abs=0.06 * (high - low))
+    middle, most = np.interp([0.5, 0.975], of_sd / of_sd[-1], sd)
+    assert (found.sd.median, found.sd.high) == pytest.approx((middle, most), rel=0.08, abs=0.06 * own_sd)
+
+
 def test_a_difference_does_not_pair_draws() -> None:
     ordered = np.sort(np.random.default_rng(1).normal(size=4000))
     assert np.std(difference(ordered, ordered)) == pytest.approx(np.sqrt(2), abs=0.05)

@@ -18,7 +18,13 @@ from analysis.report.serial import UNWRITTEN
 from analysis.stats.arrays import FloatArray, in_brief, numbers, share
 from analysis.stats.frames import Result
 
-_CELLS, _MEANS, _SPREADS = 240, 80, 40
+_CELLS = 240
+_COARSE, _FINE, _PASSES = (40, 20), (80, 40), 2
+"""Places of the mean and of the SD. Twice on the coarse grid: a posterior much narrower than its steps is found."""
+_KEPT = 1e-5
+"""What is left out on each side of a coarse marginal when the next grid is laid."""
+_BEYOND, _WIDEST = 8.0, 20.0
+"""So many ranges of all draws the mean may lie beyond them; the largest SD in ranges. Of two people both are needed."""
 _LARGEST = 1e100
 """Of a draw: squares of larger ones are no numbers."""
 
@@ -47,22 +53,55 @@ def pooled_group(draws: Sequence[FloatArray], confidence: float = 0.95) -> Group
     draws, level = _people(draws), share(confidence, "confidence")
     values, own = _histograms(draws)
     medians = np.array([np.median(one) for one in draws])
-    scale = max(float(np.std(medians, ddof=1)), float(values[1] - values[0]))
-    means = np.linspace(values[0], values[-1], _MEANS)
-    sds = np.geomspace(float(values[1] - values[0]), 4 * float(values[-1] - values[0]), _SPREADS)
-    density = np.exp(-0.5 * ((values - means[:, None, None]) / sds[:, None]) ** 2) / sds[:, None]
-    density /= density.sum(axis=-1, keepdims=True)
-    likely = np.einsum("msv,pv->msp", density, own)  # not by BLAS, whose last digit hangs on its threads
-    log_weights = np.log(np.maximum(likely, 1e-300)).sum(axis=-1) + np.log(sds / (1 + (sds / scale) ** 2))
-    weights = np.exp(log_weights - log_weights.max())
-    weights /= weights.sum()
-    of_people = own * np.einsum("msv,msp->pv", density, weights[..., None] / np.maximum(likely, 1e-300))
+    step, span = float(values[1] - values[0]), float(values[-1] - values[0])
+    scale = max(float(np.std(medians, ddof=1)), step)
+    of_mean, of_sd = (values[0] - _BEYOND * span, values[-1] + _BEYOND * span), (step, _WIDEST * span)
+    for _ in range(_PASSES):
+        coarse = _group_on(values, own, (of_mean, of_sd), _COARSE, scale)
+        of_mean = _around(coarse.means, coarse.weights.sum(axis=1))
+    of_sd = _around(coarse.sds, coarse.weights.sum(axis=0))  # near the mean: away from it SDs are too large
+    found = _group_on(values, own, (of_mean, of_sd), _FINE, scale)
+    means, sds, weights = found.means, found.sds, found.weights
+    of_people = own * np.einsum("msv,msp->pv", found.density, weights[..., None] / found.likely)
     return Group(
         mean=_estimate(means, weights.sum(axis=1), level),
         sd=_estimate(sds, weights.sum(axis=0), level),
         people=tuple(_estimate(values, one, level) for one in of_people),
         mean_draws=_quantiles(means, weights.sum(axis=1), (np.arange(draws[0].size) + 0.5) / draws[0].size),
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _GroupGrid:
+    """How likely each mean and SD are (`weights`); the `density` of values under them, how `likely` each person is."""
+
+    means: FloatArray
+    sds: FloatArray
+    density: FloatArray
+    likely: FloatArray
+    weights: FloatArray
+
+
+_Ends = tuple[float, float]
+
+
+def _group_on(
+    values: FloatArray, own: FloatArray, around: tuple[_Ends, _Ends], sizes: tuple[int, int], scale: float
+) -> _GroupGrid:
+    """On even means and even logarithms of the SD. Normal densities are not cut at the ends of the draws."""
+    means, sds = np.linspace(*around[0], sizes[0]), np.geomspace(*around[1], sizes[1])
+    density = np.exp(-0.5 * ((values - means[:, None, None]) / sds[:, None]) ** 2) / (sds[:, None] / sds[-1])
+    likely = np.maximum(np.einsum("msv,pv->msp", density, own), 1e-300)  # BLAS hangs on threads
+    log_weights = np.log(likely).sum(axis=-1) + np.log(sds / (1 + (sds / scale) ** 2))
+    weights = np.exp(log_weights - log_weights.max())
+    return _GroupGrid(means=means, sds=sds, density=density, likely=likely, weights=weights / weights.sum())
+
+
+def _around(values: FloatArray, weights: FloatArray) -> _Ends:
+    """Where a marginal is, with a place to spare on both sides."""
+    passed = np.cumsum(weights)
+    first, last = int(np.searchsorted(passed, _KEPT)), int(np.searchsorted(passed, 1 - _KEPT))
+    return float(values[max(first - 1, 0)]), float(values[min(last + 1, values.size - 1)])
 
 
 def _people(draws: object) -> list[FloatArray]:
