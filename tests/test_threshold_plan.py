@@ -64,7 +64,14 @@ def test_a_plan_says_which_procedure_to_take_and_what_was_assumed(found: Thresho
     (table,) = parts[1].tables
     assert all(len(row) == len(table.header) for row in table.rows)
     assert "threshold 9.5, spread 0.25" in parts[2].items[0]
+    assert "The posterior rule goes from 6 to 18 in sixtieths" in parts[2].items[1]
     assert (tmp_path / "figure-thresholds.png").is_file()
+
+
+def test_a_plan_does_not_say_of_a_designs_own_rule_what_another_would_do(tmp_path: Path) -> None:
+    own = threshold_power(ThresholdRequest(config="threshold", trials="10", observers=4))
+    how = sections_of_plan(own, tmp_path)[2].items[1]
+    assert how.endswith(" The posterior rule is that of the design, at its levels.")
 
 
 def test_which_designs_have_a_threshold_to_plan() -> None:

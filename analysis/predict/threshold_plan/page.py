@@ -117,10 +117,12 @@ def _assumed(found: ThresholdPower) -> Iterator[str]:
         f"SD of {found.log_threshold_sd:g} of their logarithm."
     )
     low, high = min(found.levels), max(found.levels)
+    sixtieths = f"from {low:g} to {high:g} in sixtieths"
+    rule = f"goes {sixtieths} and minimises the expected variance of the threshold; width and lapses are unknown"
     yield (
-        f"Constant stimuli are the design's {len(found.levels)} levels, equally often; what adapts goes from {low:g} "
-        f"to {high:g} in sixtieths. Tracks begin at {high:g}, in steps of an eighth, a sixteenth and a thirtieth of "
-        "the range. The posterior rule minimises the expected variance of the threshold; width and lapses are unknown."
+        f"Constant stimuli are the design's {len(found.levels)} levels, each once before one comes again. Tracks go "
+        f"{sixtieths}; they begin at {high:g}, in steps of an eighth, a sixteenth and a thirtieth of the range. The "
+        f"posterior rule {'is that of the design, at its levels' if found.own_rule else rule}."
     )
     yield (
         "Each run is fitted as the report fits it: cumulative normal of the level, lapse rate unknown, the same "

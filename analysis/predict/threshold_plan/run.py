@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from analysis.predict.power.grid import whole_numbers
 from analysis.predict.threshold_plan.observers import Answers, Observers, answers_by, procedures
 from analysis.psychometric.people import PersonFit, ShareAtLevel, person_fit
 from analysis.psychometric.priors import Priors
-from analysis.report.serial import NotebookResult, plain
+from analysis.report.serial import UNWRITTEN, NotebookResult, plain
 from analysis.report.terminal import untold
 from analysis.stats.arrays import FloatArray
 from analysis.summary.thresholds import FittedShare, fitted_share, has_own_priors, numeric_factor, priors_of
@@ -63,7 +63,10 @@ class ProcedurePower:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThresholdPower(NotebookResult):
-    """The content of `power.json` for a design with a threshold. `best`: by trials, the procedure of least error."""
+    """The content of `power.json` for a design with a threshold. `best`: by trials, the procedure of least error.
+
+    `own_rule`: the posterior rule is the design's.
+    """
 
     experiment: str
     title: str
@@ -81,6 +84,7 @@ class ThresholdPower(NotebookResult):
     procedures: tuple[ProcedurePower, ...]
     best: dict[str, str]
     provenance: dict[str, str]
+    own_rule: bool = field(default=False, metadata=UNWRITTEN)
 
     def rows(self) -> list[dict[str, object]]:
         """A row a procedure and number of trials."""
@@ -138,6 +142,7 @@ def threshold_power(request: ThresholdRequest, tell: Callable[[str], None] = unt
         procedures=tuple(found),
         best={str(count): _best(found, count) for count in trials},
         provenance=provenance(),
+        own_rule=_own_rule(planned) is not None,
     )
 
 
