@@ -167,6 +167,10 @@ def test_too_few_answers_are_no_fit_and_too_many_people_are_sampled(config: Desi
     assert many is not None
     assert (many.people, many.fitted) == (MOST_FITTED + 3, MOST_FITTED)
     assert sum(point.trials for point in many.conditions[0].points) == 5 * (MOST_FITTED + 3)
+    twice = answered(config, {(f"P{i:03d}", "asymmetric-1"): 10.0 for i in range(MOST_FITTED + 3)}, trials=2)
+    found = summarise(config, twice)
+    (told,) = threshold_sentences(found, found.questions["response"])
+    assert f", mean over {MOST_FITTED} of {MOST_FITTED + 3} people: " in told
     every = thresholds(config, "response", crowd, everybody=True)
     assert every is not None
     assert every.fitted == MOST_FITTED + 3

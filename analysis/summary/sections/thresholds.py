@@ -45,7 +45,8 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
         digits = _digits(of)
         shown = "; ".join(f"{_condition(found, one.levels)}{_group_words(one, digits)}" for one in told[:_TOLD])
         more = f"; and of {len(told) - _TOLD} more conditions" if len(told) > _TOLD else ""
-        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over people: {shown}{more}."
+        over = "people" if of.fitted == of.people else f"{of.fitted:,} of {of.people:,} people"
+        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over {over}: {shown}{more}."
 
 
 def _group_words(one: ConditionFit, digits: int | None) -> str:
