@@ -188,6 +188,7 @@ def test_a_legend_stands_below_the_name_of_the_axis_however_low_the_panels_are(t
     [
         ({}, "q (1 to 7)"),
         ({"minimum_text": "no $", "maximum_text": "yes"}, r"q (1 = no \$, 7 = yes)"),
+        ({"maximum_text": "yes"}, "q (1, 7 = yes)"),
         (
             {"minimum_text": "not at all", "maximum_text": "completely so"},
             "q\n(1 = not at all, 7 = completely so)",
@@ -272,7 +273,8 @@ def test_a_condition_of_several_factors_is_called_by_its_levels_beside_its_d_pri
     table = answered(SAID)
     way = pd.Series(["forward", "backward"] * (len(table) // 2)).where(table["stimulus"] == 1)
     (_, by_test) = tables_of(summarise(detection(ways), table.assign(direction=way)))
-    assert "6 V, backward" in [row[1] for row in by_test.rows]
+    of = list(dict.fromkeys(row[1] for row in by_test.rows if row[0] == "d′, pooled"))
+    assert of == ["all conditions", "6 V, forward", "6 V, backward", "10 V, forward", "10 V, backward"]  # as designed
 
 
 @pytest.mark.slow

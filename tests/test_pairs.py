@@ -120,6 +120,8 @@ def test_that_a_tie_counts_as_half_a_choice_is_said_where_there_may_be_one(
             ReportData(title="T", statistics=StudyStatistics(designs={"pairs": summary}))
         )
         assert section.tables[0].caption == f"rather: how often each was chosen{said}, by condition"
+        drawn = "Drawn is how often each was chosen, a tie as half (rather)."
+        assert (drawn in section.pictures[0].caption) == bool(said)
 
 
 def test_the_items_of_a_parameter_are_headed_by_its_name_and_unit() -> None:

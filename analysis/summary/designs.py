@@ -127,7 +127,8 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
     scored, people = found.scored, found.people
     apart = [*factors, *(["stimulus"] if "stimulus" in scored else [])]
     cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, apart)))
-    conditions = {_named_condition(some, factors): some for some in _conditions(found.real, factors) if factors}
+    there = sorted(_conditions(found.real, factors), key=lambda some: _place(design, _levels(design, some)))
+    conditions = {_named_condition(some, factors): some for some in there if factors}
     tests = (
         *condition_tests(design, question, people, _groups(design, found.real)),
         *(() if design.adapted else sensitivity(design.trial.kind, question, scored, conditions)),
@@ -157,7 +158,7 @@ def _is_held(design: DesignConfig, question: QuestionConfig) -> bool:
 
 
 def _scale(question: QuestionConfig) -> str | None:
-    """What the numbers of a rating or ranking mean."""
+    """What the numbers of a rating or ranking mean: its ends, with their words if they have any."""
     if question.kind == "ranking":
         return f"1 = {question.minimum_text}"
     if question.kind != "rating":
@@ -165,7 +166,7 @@ def _scale(question: QuestionConfig) -> str | None:
     if not (question.minimum_text or question.maximum_text):
         return f"{question.minimum:g} to {question.maximum:g}"
     ends = ((question.minimum, question.minimum_text), (question.maximum, question.maximum_text))
-    return ", ".join(f"{end:g} = {text}" for end, text in ends if text)
+    return ", ".join(f"{end:g} = {text}" if text else f"{end:g}" for end, text in ends)
 
 
 def varied(design: DesignConfig) -> list[str]:
@@ -180,15 +181,21 @@ def varied(design: DesignConfig) -> list[str]:
 
 def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[ConditionSummary, ...]:
     """The conditions in the order in which the design names its levels; catch trials last."""
+    return tuple(sorted(cells, key=lambda cell: (bool(cell.catch), _place(design, cell.levels))))
+
+
+def _place(design: DesignConfig, levels: Mapping[str, Level]) -> list[int]:
+    """Where a condition stands: the place of each of its levels in the design."""
     compared = design.trial.compare or ""
+    named = {f"{compared}_1": compared, f"{compared}_2": compared}
+    known = {name: design.factors[named.get(name, name)].all_levels for name in varied(design)}
+    return [some.index(levels[name]) if name in levels else len(some) for name, some in known.items()]
 
-    def place(cell: ConditionSummary) -> tuple[bool, list[int]]:
-        named = {f"{compared}_1": compared, f"{compared}_2": compared}
-        levels = {name: design.factors[named.get(name, name)].all_levels for name in varied(design)}
-        found = [some.index(cell.levels[name]) if name in cell.levels else len(some) for name, some in levels.items()]
-        return bool(cell.catch), found
 
-    return tuple(sorted(cells, key=place))
+def _levels(design: DesignConfig, rows: pd.DataFrame) -> dict[str, Level]:
+    """The levels of a condition, as its rows have them; catch trials lack some."""
+    first = rows.iloc[0]
+    return {factor: first[factor] for factor in varied(design) if not pd.isna(first[factor])}
 
 
 def _preferred(
@@ -256,10 +263,9 @@ def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.Dat
 def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.DataFrame) -> ConditionSummary:
     means = rows.groupby("participant_id")["score"].mean().to_numpy(dtype=np.float64)
     first = rows.iloc[0]
-    levels = {factor: first[factor] for factor in varied(design) if not pd.isna(first[factor])}
     mean = float(means.mean()) if means.size else None
     described = ConditionSummary(
-        levels=levels,
+        levels=_levels(design, rows),
         people=int(means.size),
         trials=len(rows),
         mean=math.exp(mean) if question.kind == "number" and mean is not None else mean,

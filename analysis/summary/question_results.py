@@ -63,8 +63,8 @@ class QuestionSummary:
 
     `chance`: how often who does not know is right; `None` where nothing is right, or stimuli were to be detected.
     `preferred`: of pairs, how often each level was chosen of all trials that had it, a tie as half, in the mean over
-    people. `scale`: what the ends of a rating or rank 1 mean. `thresholds`: the psychometric functions over a numeric
-    factor, where an answer can be a success. `pairs`: scores of compared pairs.
+    people. `scale`: the ends of a rating, with their words, or what rank 1 means. `thresholds`: the psychometric
+    functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
     `held`: its share of successes is where a procedure held it, which chose the levels by the answers. `not_above_0`:
     how many numbers have no logarithm, and so stand in no mean; `None` without any.
     """

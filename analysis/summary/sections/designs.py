@@ -266,7 +266,7 @@ def lacking_conditions(found: DesignSummary) -> Iterator[str]:
 
 def _picture(name: str, found: DesignSummary) -> Picture:
     shown = {asked: question for asked, question in found.questions.items() if question.drawn}
-    shares = [f"the share of {one.counted} ({asked})" for asked, one in shown.items() if one.counted]
+    shares = [f"{words} ({asked})" for asked, one in shown.items() if (words := _drawn_words(one))]
     drawn = f" Drawn is {joined_by_and(shares)}." if shares else ""
     means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in shown.items())
     return Picture(
@@ -274,6 +274,12 @@ def _picture(name: str, found: DesignSummary) -> Picture:
         caption=f"{found.title.rstrip('.?!')}.{drawn}{_whiskers([*shown.values()], found.n)}",
         alt=f"Means by condition. {means}",
     )
+
+
+def _drawn_words(question: QuestionSummary) -> str:
+    """What a picture's marks count, where its axis does not say it; else empty."""
+    tie = _tie(question)
+    return f"the share of {question.counted}" if question.counted else f"how often each was chosen{tie}" if tie else ""
 
 
 def _whiskers(shown: Sequence[QuestionSummary], people: int) -> str:
