@@ -63,9 +63,9 @@ class Train:
 
     def due_s(self) -> float:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
-        # ticks that went by while this machine stood still are left out, and one that would follow a late shot too soon
+        # left out: ticks in a standstill, or too soon after a late shot: by half, as guns always late keep their rate
         every_us, begun_s = round(self._step.repeat_every_s * 1e6), self._onset_s
-        earliest_s = max(self._live.clock.now(), self._last_s + self._step.repeat_every_s - LEAD_S)
+        earliest_s = max(self._live.clock.now(), self._last_s + self._step.repeat_every_s / 2)
         tick_s = begun_s + math.ceil((earliest_s - begun_s) * 1e6 / every_us) * every_us / 1e6
         return max(tick_s, self._live.gun.status().ready_at_s)
 
