@@ -63,6 +63,14 @@ def test_a_map_gives_the_fits_of_the_counts_themselves(lab: Path) -> None:
     assert found.to_frame()["threshold"].nunique() == 1
 
 
+def test_conditions_stand_as_people_count(lab: Path) -> None:
+    text = (lab / "lab.csv").read_text()
+    (lab / "lab.csv").write_text(text.replace("links", "v12").replace("rechts", "v2"))
+    found = mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out").thresholds
+    assert [one.levels["condition"] for one in found.conditions] == ["v2", "v12"]
+    assert [(one.a["condition"], one.b["condition"]) for one in found.differences] == [("v2", "v12")]
+
+
 @pytest.mark.slow
 def test_where_nobody_has_a_threshold_among_the_levels_no_mean_is_told(lab: Path) -> None:
     rows = [f"VP_0{who};{level};{'ja' if who == 1 else 'nein'};links" for who in (1, 2) for level in (6, 10, 14) * 20]

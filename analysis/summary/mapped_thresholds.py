@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pandas as pd
+
 from analysis.logs.files import Problem, shown_name
 from analysis.logs.level_map import LevelMap, MappedLevels, read_levels
 from analysis.report import placing
@@ -25,6 +27,7 @@ from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 from experiments.study.folders import PlaceError
+from experiments.study.study import by_code
 
 _NAME, _ASKED = "thresholds", "success"
 
@@ -84,8 +87,10 @@ def mapped_thresholds(paths: list[Path], columns: Path, out: Path) -> MappedThre
 
 def _fitted(read: MappedLevels, mapping: LevelMap) -> Thresholds:
     named = mapping.columns.condition is not None
+    as_counted = pd.CategoricalDtype(sorted(read.table["condition"].dropna().unique(), key=by_code), ordered=True)
+    rows = read.table.astype({"condition": as_counted}) if named else read.table
     return fitted_thresholds(
-        LevelledAnswers(rows=read.table, conditions=("condition",) if named else ()),
+        LevelledAnswers(rows=rows, conditions=("condition",) if named else ()),
         Thresholds(factor=mapping.name, share=mapping.share, guess=1 / mapping.answers if mapping.answers else None),
         falls=mapping.falling,
         everybody=True,
