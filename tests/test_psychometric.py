@@ -37,6 +37,13 @@ def test_means_are_those_of_psignifit_under_its_priors(case: dict[str, Any]) -> 
         assert getattr(found, rate).mean == pytest.approx(case["mean"][rate], abs=0.005)
 
 
+def test_the_lower_end_of_a_width_is_where_the_posterior_has_it() -> None:
+    """1.929 to 20.65 by sums over 199 thresholds, 238 widths and 100 lapse rates; the prior begins at the step, 1."""
+    levels = [6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 18.0]
+    found = psychometric_fit(levels, [5, 6, 4, 7, 6, 9, 10, 9, 10], [10] * 9, guess=0.5)
+    assert (found.width.low, found.width.median, found.width.high) == pytest.approx((1.929, 7.544, 20.65), rel=0.02)
+
+
 def test_a_listed_prior_is_a_density_between_its_values_and_one_value_is_known() -> None:
     """Without data to speak of, draws are those of the prior: even over the logarithm of the width, from 1 to 16."""
     widths, lapses = np.geomspace(1.0, 16.0, 33), np.linspace(0.0, 0.08, 5)

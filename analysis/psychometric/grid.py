@@ -98,10 +98,16 @@ def posterior(counts: LevelCounts, priors: Priors, fixed: dict[str, float]) -> P
 
 
 def _axis(name: str, bounds: tuple[float, float], size: int) -> Axis:
-    """Middles of even cells; of a rate, whose density ends at its bound, the nodes of Gauss and Legendre."""
+    """Middles of even cells; of a rate, whose density ends at its bound, the nodes of Gauss and Legendre.
+
+    Cells of a width are as its logarithm has them: near its lowest a share hangs on it most.
+    """
     low, high = bounds
     if low == high:
         return Axis(low=low, high=high, values=np.array([low]), cells=np.zeros(1))
+    if name == "width" and low > 0:
+        ends = np.geomspace(low, high, size + 1)
+        return Axis(low=low, high=high, values=np.sqrt(ends[1:] * ends[:-1]), cells=np.diff(ends))
     if name in ("threshold", "width"):
         cells = np.full(size, (high - low) / size)
         return Axis(low=low, high=high, values=low + cells * (np.arange(size) + 0.5), cells=cells)
