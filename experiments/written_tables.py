@@ -41,7 +41,7 @@ def tables_of_stopped(place: Place, contents: Contents, why: str) -> int:
 
 
 def _unwritten(place: Place, error: OSError) -> str:
-    mend = "free some space" if error.errno in storage.FULL else "see to that"
+    mend = "free some space" if error.errno in storage.DISK_FULL else "see to that"
     return (
         f"every answer is in the journal, but its table could not be written ({error.filename or place.table}: "
         f"{error.strerror}): {mend}, and `recoil rebuild {place.journal}` writes it"

@@ -227,7 +227,7 @@ class Journal:
             self._take_back()
             reason = error.strerror if isinstance(error, OSError) else error
             safe = f"everything up to record {self._count - 1} is safe on the disk" if self._count else _NOTHING
-            if getattr(error, "errno", None) in storage.FULL:
+            if getattr(error, "errno", None) in storage.DISK_FULL:
                 safe += "; free some space there, then go on with --resume"
             raise JournalError(f"{self.path}: record {self._count} cannot be written ({reason}); {safe}") from error
         self._synced_s = self._clock.now() if self._each else None

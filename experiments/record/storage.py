@@ -22,7 +22,7 @@ from device.machine_clock import machine_s
 OWNER_FILE = 0o600
 OWNER_FOLDER = 0o700
 JOURNAL_ENDING = "_journal.jsonl"
-FULL = (errno.ENOSPC, errno.EDQUOT)
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 """The numbers of a system's errors that say that a disk is full."""
 
 
