@@ -33,6 +33,8 @@ from tests.designs import merged
 from tests.felt_thresholds import VOLTAGES, Somebody, shares_right, voltage_at, whole_session, whole_setup
 from tests.other_trials import with_levels
 
+pytestmark = pytest.mark.slow
+
 HURRY = shipped_folder() / "examples" / "hurry.toml"
 PAPER = {"vibration": 0.557, "asymmetric-1": 0.793, "asymmetric-2": 0.929}
 PEOPLE = 120
@@ -98,7 +100,6 @@ def forward_shares(setup: Setup[DesignConfig], plan: Plan) -> dict[str, float]:
 # experiment 1
 
 
-@pytest.mark.slow
 def test_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
     found = [forward_shares(DIRECTION, plan) for plan in plans(DIRECTION)]
     for name, rate in PAPER.items():
@@ -107,7 +108,6 @@ def test_people_are_right_at_the_papers_forward_rates_in_the_mean() -> None:
         )
 
 
-@pytest.mark.slow
 def test_people_who_differ_and_lapse_are_right_at_the_mean_rate_of_theory() -> None:
     spreads = {"drift_factor_sd": 0.3, "log_boundary_sd": 0.2, "logit_start_sd": 0.3}
     setup = felt_direction(people=spreads, diffusion={"lapses": {"rate": 0.05}})
@@ -141,7 +141,6 @@ def hurried() -> tuple[Setup[DesignConfig], dict[tuple[str, str], list[tuple[boo
     return setup, found
 
 
-@pytest.mark.slow
 def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     setup, found = hurried
     law = law_of(setup, "response")
@@ -154,7 +153,6 @@ def test_who_is_hurried_errs_as_much_more_as_the_law_says(hurried: Any) -> None:
     assert speed + 0.08 < accuracy
 
 
-@pytest.mark.slow
 def test_who_is_hurried_is_as_much_faster_as_the_law_says(hurried: Any) -> None:
     # optional stopping: E[X] at the answer is z + v E[t], so E[t] = (a P - z) / v; and z (a - z) without drift
     setup, found = hurried
@@ -223,7 +221,6 @@ def ratings() -> np.ndarray:
     return np.array([[person[name] for name in PAPER] for person in people], dtype=np.float64)
 
 
-@pytest.mark.slow
 def test_mean_ratings_are_near_those_that_the_config_assumes_for_the_paper(ratings: np.ndarray) -> None:
     drawn = law_of(load_setup("preference"), "rating")
     assert isinstance(drawn, RatingsLaw)
@@ -232,7 +229,6 @@ def test_mean_ratings_are_near_those_that_the_config_assumes_for_the_paper(ratin
     assert np.all(np.abs(ratings.mean(axis=0) - assumed) < 0.2 + 4.5 * error)
 
 
-@pytest.mark.slow
 def test_as_many_rate_both_shots_alike_as_in_the_paper(ratings: np.ndarray) -> None:
     # 2 of 14; by chance some others come to the same grain
     share = (ratings[:, 1] == ratings[:, 2]).mean()
@@ -265,7 +261,6 @@ def test_without_noise_a_rating_is_the_law() -> None:
         assert found[name] == pytest.approx(min(10.0, 2.3 + 4.9 * math.log(1 + strength)), abs=0.05 + 1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("jnd", [0.1, 0.33, 1.0])
 def test_three_of_four_people_tell_which_of_two_shots_a_jnd_apart_is_stronger(jnd: float) -> None:
     # with a criterion as still as can be, a rating tells what is felt; ties of what is felt alike are half right
@@ -302,7 +297,6 @@ def test_seed_and_person_make_the_ratings() -> None:
 # the example, as its user runs it
 
 
-@pytest.mark.slow
 def test_the_example_is_checked_run_and_read_with_its_instructions_and_without(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("configs", "--copy", "mine").returncode == 0
     config = "mine/examples/hurry.toml"
@@ -333,14 +327,12 @@ def test_the_example_is_checked_run_and_read_with_its_instructions_and_without(r
     assert before.trials["instruction"].isna().all()
 
 
-@pytest.mark.slow
 def test_a_check_of_the_example_has_the_words_that_are_read_out(recoil: Recoil) -> None:
     said = " ".join(recoil("check", HURRY).stdout.split())
     for text in load_setup(str(HURRY)).config.factors["instruction"].texts.values():
         assert text in said
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_an_adaptive_session_brackets_the_voltage_that_the_percept_gives(seed: int, tmp_path: Path) -> None:
     """`make soak` has 500 of them (gun_threshold)."""

@@ -31,6 +31,8 @@ from tests.recorder import markers_process, recorded, recording
 from tests.waiting import PATIENCE_S, wait_for
 from tests.warm_start import warm
 
+pytestmark = pytest.mark.slow
+
 NAME = "sub-P01_task-direction_journal.jsonl"
 CLOCKS_S = 1e-4
 """So well the clocks are mapped, on a machine however busy."""
@@ -113,7 +115,6 @@ def test_a_recording_is_the_journal_row_for_row(quick_configs: Path, tmp_path: P
         assert float(row["uncertainty_s"]) == pytest.approx(within_s, abs=CLOCKS_S)
 
 
-@pytest.mark.slow
 def test_a_run_with_markers_has_its_streams_from_its_begin_to_its_end(quick_configs: Path, tmp_path: Path) -> None:
     shorten(quick_configs)
     run = warm(*words(quick_configs, "--screen", "terminal", "--lsl"))
@@ -138,7 +139,6 @@ ResolveScope = machine
 """A network on which nobody is found, in the words of the library's own config."""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("library", "network", "said"),
     [
@@ -183,7 +183,6 @@ def resolve_bypred(*_): return {found}
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("odd", "said"),
     [
@@ -219,7 +218,6 @@ def test_what_an_odd_library_does_in_a_run_is_said_once(  # noqa: PLR0917
     assert "Traceback" not in capfd.readouterr().err
 
 
-@pytest.mark.slow
 def test_markers_need_a_folder_that_is_there_and_a_library(recoil: Recoil, tmp_path: Path) -> None:
     assert recoil("markers", "nowhere").returncode == 2
     (tmp_path / "fake").mkdir()
@@ -278,7 +276,6 @@ TEST_SHOT = {"kind": "test-shot", "method": "vibration", "held_s": 1.0}
 COUNTS = dict.fromkeys(("gun_accepted_us", "gun_start_us", "gun_end_us", "gun_count", "asked"), 1)
 
 
-@pytest.mark.slow
 def test_a_shots_uncertainty_is_the_guns_own_or_else_lies_between_request_and_record(
     whole: bytes, tmp_path: Path
 ) -> None:
@@ -443,7 +440,6 @@ def test_one_bad_entry_is_named_and_silences_no_other_run(journal: Path, whole: 
     assert [line.partition(":")[0] for line in said] == [str(results / "sub-P00"), str(other)]
 
 
-@pytest.mark.slow
 def test_a_library_that_hangs_outlives_no_run(tmp_path: Path) -> None:
     (tmp_path / "pylsl.py").write_text("import time\ntime.sleep(3600)\n")
     environment = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
@@ -454,7 +450,6 @@ def test_a_library_that_hangs_outlives_no_run(tmp_path: Path) -> None:
         assert child.wait(PATIENCE_S) == 1
 
 
-@pytest.mark.slow
 def test_a_name_that_is_no_text_ends_no_markers(tmp_path: Path) -> None:
     folder = tmp_path / os.fsdecode(b"sub-\xff")
     folder.mkdir()

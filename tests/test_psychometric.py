@@ -161,6 +161,7 @@ def test_a_group_draws_its_people_towards_each_other_by_how_little_they_say() ->
     assert group.mean.low < 12 < group.mean.high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("people", "own_sd"), [(2, 0.05), (3, 0.5), (14, 0.3), (14, 2.0), (60, 0.3)])
 def test_a_group_is_that_of_normal_values_known_with_normal_errors(people: int, own_sd: float) -> None:
     """There the posterior of the mean and SD is a sum over a plane, without draws, cells and ends."""
