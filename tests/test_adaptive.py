@@ -64,6 +64,7 @@ def test_no_row_has_an_answer_to_another_stimulus_than_its_own_whenever_a_run_st
     assert sum(check_rows(SETUPS[kind], contents) for contents in undone[kind]) > 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_run_ends_when_every_track_is_over_by_the_answers_as_they_count_in_the_end(
     kind: str, undone: dict[str, list[Contents]]

@@ -12,6 +12,7 @@ from analysis.paper.audit.printed import Rounding, read_printed
 from tests.golden_audit import rounded_either_way, rows, statcheck_cases
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("block", "mean", "n", "consistent"), rows("grim", "mean", "n", "consistent"))
 def test_grim_agrees_with_scrutiny(block: dict[str, Any], mean: str, n: int, consistent: bool) -> None:
     assert rounded_either_way(grim(mean, n, items=block.get("items", 1))) == consistent

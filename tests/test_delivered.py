@@ -226,6 +226,7 @@ def test_every_shot_of_a_run_is_measured_and_stands_in_the_journal_and_a_table(d
     assert max(map(abs, onsets)) < 5e-4
 
 
+@pytest.mark.slow
 def test_what_was_not_delivered_is_marked_and_comes_again_once(drilled: Contents):
     trials, shots = rows_of(table(drilled)), rows_of(shots_table(drilled))
     bad = {

@@ -234,6 +234,7 @@ def test_a_range_is_read_as_typed() -> None:
     assert span("--friction", " .2 - 1.5 ", (0.0, 1.0)) == (0.2, 1.5)
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_ends_with_130_and_without_a_traceback(tmp_path: Path) -> None:
     words = warm("design", "--grid", 60, "--workers", 1, "--out", tmp_path / "out")
     with subprocess.Popen(words, stderr=subprocess.PIPE) as running:

@@ -33,6 +33,7 @@ def of(name, count=24):
     return config, summarise(config, simulated(config, laws, count))
 
 
+@pytest.mark.slow
 def test_rates_by_condition_have_the_counts_and_the_exact_test_of_their_rows():
     config, laws = loaded("direction")
     table = simulated(config, laws, 14)

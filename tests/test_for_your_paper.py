@@ -146,6 +146,7 @@ def test_of_a_design_dropped_trials_and_stopped_runs_are_told_with_who_was_analy
     assert "Of 36 planned trials 6 (16.7 %) were dropped: 6 without an answer." in said
 
 
+@pytest.mark.slow
 def test_who_is_listed_by_hand_is_told_so_though_a_rule_would_leave_them_out(
     study: Path, reported: Reported, tmp_path: Path
 ) -> None:

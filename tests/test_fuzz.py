@@ -25,5 +25,6 @@ def test_a_reader_takes_anything_or_says_what_is_wrong(name: str, every: Mapping
     assert [one for one in found if one is not None] == []
 
 
+@pytest.mark.slow
 def test_no_reader_is_forgotten(every: Mapping[str, Reader]) -> None:
     assert tuple(every) == NAMES

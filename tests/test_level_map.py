@@ -63,6 +63,7 @@ def test_a_map_gives_the_fits_of_the_counts_themselves(lab: Path) -> None:
     assert found.to_frame()["threshold"].nunique() == 1
 
 
+@pytest.mark.slow
 def test_conditions_stand_as_people_count(lab: Path) -> None:
     text = (lab / "lab.csv").read_text()
     (lab / "lab.csv").write_text(text.replace("links", "v12").replace("rechts", "v2"))

@@ -38,6 +38,7 @@ def test_pooling_the_error_is_nominal_at_sphericity_and_liberal_far_from_it(foun
     assert far.null_error > ALPHA + 2 * far.monte_carlo_error(ALPHA)
 
 
+@pytest.mark.slow
 def test_taking_the_same_people_for_others_costs_most_of_the_power(found) -> None:
     assert of(found, "Tukey between participants, misused")[0].power < 0.4 * of(found, "Tukey, pooled error")[0].power
 

@@ -152,6 +152,7 @@ def test_synthetic_participants_are_ranked_as_they_were_made(logs: Path) -> None
         assert spearmanr([one.score for one in condition.scores[0].scores], VOLTS).statistic > 0.9
 
 
+@pytest.mark.slow
 def test_a_table_has_the_pair_that_was_felt_and_is_made_again_byte_for_byte(logs: Path) -> None:
     path = logs / "sub-P01" / "sub-P01_task-pairs_trials.csv"
     table, contents = pd.read_csv(path), read_journal(path.with_name("sub-P01_task-pairs_journal.jsonl"))

@@ -157,6 +157,7 @@ def test_a_marker_stays_on_the_scale():
     assert put(SCALE, 0.7349) == 7.3
 
 
+@pytest.mark.slow
 @given(
     offset_s=st.floats(-1e6, 1e6),
     trips=st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=10),

@@ -156,6 +156,7 @@ def test_the_recoil_impulse_is_the_momentum_at_its_end():
     assert shot.summary.recoil_impulse_Ns == pytest.approx(0.114 * at_end, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
 def test_the_impulses_of_a_cycle_with_its_collision_cancel(friction_N, drive_off, emf):
     shot = trace(GunParameters(friction_N=friction_N, drive_off=drive_off, emf=emf), points=4000)

@@ -50,6 +50,7 @@ def test_what_is_no_gun_is_invalid_and_spoils_no_other(engine):
     assert all(np.isnan(getattr(found, name)[1:]).all() for name in NUMBERS)
 
 
+@pytest.mark.slow
 def test_options_and_models_may_differ_within_a_batch(engine):
     found = simulate_batch(drive_off=["open", "shorted", "ajar"], emf="reciprocal", fidelity="no-inductance")
     assert found.names().tolist() == ["home", "home", "invalid"]
@@ -121,6 +122,7 @@ def test_what_one_process_compiled_is_found_by_the_next():
     assert len(names) == 1
 
 
+@pytest.mark.slow
 def test_a_return_friction_of_its_own_is_the_guns_and_an_arrays():
     alone = [simulate(GunParameters(friction_N=f, return_friction_N=r)) for f in (0.21, 0.5) for r in (0.3, 1.12)]
     out, back = [0.21, 0.21, 0.5, 0.5], [0.3, 1.12, 0.3, 1.12]

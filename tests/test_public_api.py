@@ -156,6 +156,7 @@ def test_help_loads_none_of_what_commands_use() -> None:
     assert loaded(code) == set()
 
 
+@pytest.mark.slow
 def test_the_version_is_the_packages(recoil: Recoil) -> None:
     done = recoil("--version")
     assert (done.returncode, done.stdout.strip()) == (0, version("recoil"))

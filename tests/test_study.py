@@ -89,6 +89,7 @@ def levels(kind: Any) -> st.SearchStrategy[tuple[str, ...]]:
     return st.lists(st.sampled_from(get_args(kind)), unique=True).map(tuple)
 
 
+@pytest.mark.slow
 @given(all_facts, ages, ages, levels(Sex), levels(Handedness))
 def test_someone_is_eligible_exactly_if_every_rule_holds(
     facts: Facts, low: int | None, high: int | None, sex: Any, handedness: Any

@@ -23,6 +23,7 @@ def found() -> ThresholdPower:
     return threshold_power(ThresholdRequest(config="voltages", trials="10,20", observers=6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("procedure", procedures("yes"))
 def test_every_procedure_stays_at_levels_that_may_be_felt(procedure: str) -> None:
     made = answers_by(procedure, PEOPLE, LEVELS, 24, np.random.default_rng(2))
@@ -68,6 +69,7 @@ def test_a_plan_says_which_procedure_to_take_and_what_was_assumed(found: Thresho
     assert (tmp_path / "figure-thresholds.png").is_file()
 
 
+@pytest.mark.slow
 def test_a_plan_does_not_say_of_a_designs_own_rule_what_another_would_do(tmp_path: Path) -> None:
     own = threshold_power(ThresholdRequest(config="threshold", trials="10", observers=4))
     how = sections_of_plan(own, tmp_path)[2].items[1]

@@ -157,6 +157,7 @@ def test_a_share_that_falls_with_the_level_is_fitted_as_one(config: DesignConfig
     assert np.all(np.diff(other.curve(LEVELS)[0]) < 0)
 
 
+@pytest.mark.slow
 def test_too_few_answers_are_no_fit_and_too_many_people_are_sampled(config: DesignConfig) -> None:
     few = answered(config, {("A", "asymmetric-1"): 9.0}, trials=1)
     one = thresholds(config, "response", few)
@@ -212,6 +213,7 @@ def test_yes_counts_with_the_catch_trials_as_guesses(shipped: dict[str, Any]) ->
     assert person.fit.guess.median == pytest.approx(person.catch[0] / 60, abs=0.06)
 
 
+@pytest.mark.slow
 def test_a_comparison_with_a_standard_counts_how_often_the_level_was_chosen(shipped: dict[str, Any]) -> None:
     config, laws = loaded("stronger")
     found = shipped["stronger"].questions["stronger"].thresholds

@@ -89,6 +89,7 @@ def test_a_shot_whose_magnet_is_not_home_by_its_tick_waits_for_it(tmp_path: Path
     assert all(start >= home + 1_100_000 for (_, home), (start, _) in pairwise(starts_homes_us))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stood_s", [0.5, 1.6, 3.4, 3.9])
 def test_shots_that_a_standstill_of_the_machine_held_up_are_not_made_up_for(tmp_path: Path, stood_s: float) -> None:
     """None follows another within half of the design's interval."""

@@ -97,6 +97,7 @@ def with_remarks(whole: bytes, *bodies: dict[str, object]) -> bytes:
 # what is shown of a run
 
 
+@pytest.mark.slow
 def test_a_run_is_shown_with_its_place_and_what_is_awaited_and_without_any_answer(journal: Path, whole: bytes) -> None:
     journal.write_bytes(part(whole, "ask", 8))
     with held(journal):
