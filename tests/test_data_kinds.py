@@ -25,6 +25,8 @@ from recoil.config_files import new_study
 from tests.conftest import Recoil, refused
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows
 
+pytestmark = pytest.mark.slow
+
 HANDS: dict[DataKind, tuple[str, str]] = {
     "real": ("participant", "RG-2:0007"),
     "simulated gun": ("participant", "simulated"),
@@ -119,7 +121,6 @@ def test_the_same_code_may_be_a_persons_and_a_synthetic_ones_but_only_once_each(
 # statistics
 
 
-@pytest.mark.slow
 def test_each_kinds_f_is_that_of_its_own_people(mixed: Path) -> None:
     found = summarize(read_logs([mixed], include_synthetic=True))
     assert found.direction is not None
@@ -144,7 +145,6 @@ def test_each_kinds_f_is_that_of_its_own_people(mixed: Path) -> None:
     assert sorted({str(row["data"]) for row in found.rows()}) == ["real", "simulated gun", "synthetic"]
 
 
-@pytest.mark.slow
 def test_a_notebook_is_told_the_argument(mixed: Path) -> None:
     found = public.analyze(mixed)
     assert {one.remedy for one in found.excluded} == {"`include_synthetic=True`"}
@@ -157,7 +157,6 @@ def is_forward(row: dict[str, str], method: str) -> bool:
     return row["direction"] == "forward" and row["method"] == method
 
 
-@pytest.mark.slow
 def test_the_command_keeps_them_apart_in_tables_and_figures(recoil: Recoil, mixed: Path, tmp_path: Path) -> None:
     done = recoil("analyze", "results", "--out", "out")
     alone = json.loads((tmp_path / "out" / "statistics.json").read_text())
@@ -180,7 +179,6 @@ def test_the_command_keeps_them_apart_in_tables_and_figures(recoil: Recoil, mixe
     assert "DATA OF PEOPLE AT A SIMULATED GUN AND OF SYNTHETIC PARTICIPANTS are shown as well" in top
 
 
-@pytest.mark.slow
 def test_times_are_fitted_to_one_kind_alone(recoil: Recoil, mixed: Path, tmp_path: Path) -> None:
     done = recoil("fit", "times", "results", "--out", "fit")
     assert done.returncode == 1
@@ -214,7 +212,6 @@ def do(pilot: Path, code: str, *, person: bool, **more: Any) -> Path:
     return run(request, synthetic_screen, VirtualClock()).place.journal
 
 
-@pytest.mark.slow
 def test_a_synthetic_run_does_not_use_up_a_participant(recoil: Recoil, pilot: Path) -> None:
     do(pilot, "P01", person=False)
     do(pilot, "S01", person=False)
@@ -228,7 +225,6 @@ def test_a_synthetic_run_does_not_use_up_a_participant(recoil: Recoil, pilot: Pa
     assert "last record" not in shown  # whose clock is that of a simulation
 
 
-@pytest.mark.slow
 def test_it_gives_way_to_the_persons_run_and_is_kept(recoil: Recoil, pilot: Path) -> None:
     journal = do(pilot, "P01", person=False)
     made = journal.read_bytes()
@@ -247,7 +243,6 @@ def test_a_synthetic_run_never_takes_the_place_of_a_persons(pilot: Path) -> None
     assert journal.read_bytes() == made
 
 
-@pytest.mark.slow
 def test_orders_are_balanced_among_people_and_among_synthetic_participants_apart(pilot: Path) -> None:
     for code in ("S01", "S02", "S03", "S04"):
         do(pilot, code, person=False)
@@ -272,7 +267,6 @@ def test_a_run_without_a_code_says_what_to_add(recoil: Recoil, tmp_path: Path) -
     assert not (tmp_path / "results").exists()
 
 
-@pytest.mark.slow
 def test_an_entry_of_the_rules_that_means_somebody_in_data_of_one_kind_is_not_called_idle(
     mixed: Path, tmp_path: Path
 ) -> None:
@@ -287,7 +281,6 @@ def test_an_entry_of_the_rules_that_means_somebody_in_data_of_one_kind_is_not_ca
     assert "P02" in [one["participant"] for one in found["kept_apart"]["synthetic"]["excluded"]]
 
 
-@pytest.mark.slow
 def test_tables_of_data_that_were_kept_apart_before_are_named_as_left_there(
     mixed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -30,6 +30,8 @@ from tests.conftest import Recoil, refused
 from tests.journals import forged
 from tests.waiting import PATIENCE_S, wait_for
 
+pytestmark = pytest.mark.slow
+
 NAME = "sub-P01_task-direction_journal.jsonl"
 
 
@@ -97,7 +99,6 @@ def with_remarks(whole: bytes, *bodies: dict[str, object]) -> bytes:
 # what is shown of a run
 
 
-@pytest.mark.slow
 def test_a_run_is_shown_with_its_place_and_what_is_awaited_and_without_any_answer(journal: Path, whole: bytes) -> None:
     journal.write_bytes(part(whole, "ask", 8))
     with held(journal):
@@ -347,7 +348,6 @@ def no_file_at_all(path: Path) -> None:
     path.symlink_to("nothing")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("bad", [loop, os.mkfifo, device_without_end, no_file_at_all])
 @pytest.mark.parametrize("name", ["sub-P00", f"sub-P01/{NAME.replace('direction', 'other')}"])
 def test_one_bad_entry_is_named_and_hides_no_other_run(
@@ -400,7 +400,6 @@ def test_a_journal_is_read_a_look_at_a_time(journal: Path, whole: bytes, monkeyp
     assert "damaged" not in states
 
 
-@pytest.mark.slow
 def test_a_reader_that_breaks_off_ends_the_page_with_one_message(journal: Path, whole: bytes) -> None:
     def made(seen: Watched) -> tuple[str, ...]:
         if seen.rows:
@@ -544,7 +543,6 @@ def test_of_many_wrong_tokens_at_a_time_some_get_no_answer(
     assert asked(server, f"/{server.token}/")[0] == 200
 
 
-@pytest.mark.slow
 def test_a_viewer_gets_what_is_new_without_asking_again(server: WatchServer, journal: Path, whole: bytes) -> None:
     connection = http.client.HTTPConnection(serving.HOST, server.page.port, timeout=PATIENCE_S)
     connection.request("GET", f"/{server.token}/events")
