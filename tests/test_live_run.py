@@ -1266,16 +1266,21 @@ def test_a_note_that_cannot_be_written_is_given_back_in_words(tmp_path: Path, mo
         assert "the dog barked" in sitting.window.troubles[0]
 
 
+def full_for_one_record(disk: pytest.MonkeyPatch) -> None:
+    """The next record finds no room, those behind it do."""
+
+    def full_once(descriptor: int) -> None:
+        disk.undo()
+        full(descriptor)
+
+    disk.setattr(storage, "sync", full_once)
+
+
 @pytest.mark.parametrize("halted", [False, True])
 def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_from_it(
     halted: bool, tmp_path: Path
 ) -> None:
     with sat(DIRECTION, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
-
-        def full_once(descriptor: int) -> None:
-            disk.undo()
-            full(descriptor)
-
         sitting.to(S.ASKING)
         assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
         sitting.to(S.PREPARING)
@@ -1285,7 +1290,7 @@ def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_
         assert by_hand(sitting, events.Undo())
         entry = sitting.position.correcting
         assert entry is not None
-        disk.setattr(storage, "sync", full_once)
+        full_for_one_record(disk)
         assert sitting.live.offer(events.Correct(value="backward"))
         wait_for(lambda: sitting.window.troubles, "it is not said")
         wait_for(lambda: halted or sitting.position.state is S.STOPPED, "the run goes on")
@@ -1303,16 +1308,11 @@ def test_no_step_follows_from_a_correction_that_cannot_be_written_also_if_the_an
     tmp_path: Path,
 ) -> None:
     with sat(DIRECTION, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
-
-        def full_once(descriptor: int) -> None:
-            disk.undo()
-            full(descriptor)
-
         sitting.to(S.ASKING)
         assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
         sitting.to(S.ASKING)
         assert by_hand(sitting, events.Undo())
-        disk.setattr(storage, "sync", full_once)
+        full_for_one_record(disk)
         with at_one_instant(sitting):
             assert sitting.live.offer(events.Correct(value="backward"))
             assert sitting.live.offer(own_key(sitting, response="forward"))
