@@ -337,7 +337,7 @@ def test_what_is_half_typed_is_kept_as_a_note_when_another_command_comes_and_q_c
         screen.until(lambda look: look.line and look.says("Flag "))
         screen.keys.type("cough")
         screen.keys.press("F12")
-        screen.until(lambda look: look.state == "halted")
+        screen.at("halted")
         screen.keys.press("y", "Control_L")
         screen.until(lambda look: look.line and look.says("Why was there an emergency stop?"))
         screen.keys.type("was hurt")
@@ -366,7 +366,7 @@ def test_an_answer_that_is_half_typed_is_kept_as_a_note_when_its_question_goes(
             screen.keys.press("p")
             screen.at("rating")
             screen.keys.press("x", "Control_L")
-            screen.until(lambda look: look.state == "describing")
+            screen.at("describing")
             screen.keys.type("like a t")
         if how == "emergency stop":
             screen.keys.press("F12")

@@ -134,7 +134,7 @@ def test_what_is_half_typed_outlives_a_pause_a_note_and_a_correction(tmp_path: P
         screen.at("describing")
         screen.keys.type("like a")
         screen.keys.press("u", "Control_L")
-        screen.until(lambda look: look.state == "correcting" and look.typed == "6.5")
+        screen.until(lambda look: look.state == "correcting" and look.typed == "6.5" and look.ready)
         screen.keys.press("Escape")
         screen.until(lambda look: look.state == "describing" and look.typed == "like a")
         screen.keys.type(" toy")

@@ -283,9 +283,9 @@ def test_what_is_told_of_an_answer_follows_its_correction_but_for_an_emergency_s
         second = screen.until(lambda look: look.state == "informing" and look.serial > first.serial and look.ready)
         assert second.says(other), second.texts
         screen.keys.press("F12")
-        halted = screen.until(lambda look: look.state == "halted")
+        halted = screen.at("halted")
         screen.keys.press("u", "Control_L")
-        screen.until(lambda look: look.state == "correcting")
+        screen.at("correcting")
         screen.keys.press("e")
         screen.until(lambda look: look.state == "halted" and look.serial > halted.serial)
         assert screen.process.poll() is None
