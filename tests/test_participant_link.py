@@ -190,6 +190,18 @@ def test_a_screen_that_is_killed_in_mid_question_is_noticed(child):
 
 
 @pytest.mark.slow
+def test_a_screen_that_stands_still_while_nothing_is_asked_is_ended_and_told(child):
+    link, told = child("ready()\nfor word in words(): say(kind='beat', within_s=1)"), []
+    link.wait_ready(PATIENCE_S)
+    link.listen(lambda _: None, told.append)
+    link.show("Please wait")
+    wait_for(lambda: told)
+    assert told == ["the participant's screen stood still for 1 s and was ended"]
+    link.close()
+    assert len(told) == 1
+
+
+@pytest.mark.slow
 def test_what_the_screen_itself_fails_at_is_told(child):
     link = child("say(kind='failed', message='the window was closed')\ntime.sleep(600)")
     with pytest.raises(ParticipantError, match="the window was closed"):
@@ -223,7 +235,7 @@ def test_after_a_question_was_called_off_the_next_is_answered(child):
 
 @pytest.mark.slow
 def test_a_screen_that_reads_nothing_keeps_nobody_waiting_and_is_killed(child, monkeypatch):
-    monkeypatch.setattr("experiments.screens.participant.link.END_S", 1.0)
+    monkeypatch.setattr("experiments.screens.participant.process.END_S", 1.0)
     link = child("import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); ready(); time.sleep(600)")
     with pytest.raises(ParticipantError, match="no answer within"):
         link.ask_rating(AskRating(**fields(SCALE) | {"question": "long " * 100_000}), 0.5)

@@ -205,6 +205,18 @@ def test_a_key_that_goes_down_while_the_program_stands_still_says_for_how_long(
         assert answer.result(PATIENCE_S).stood_still_s > 0.4
 
 
+@pytest.mark.slow
+def test_a_program_that_stands_still_while_nothing_is_asked_is_noticed(display, tmp_path, monkeypatch):
+    """Nobody there hears F12 meanwhile, whatever the console says."""
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with ParticipantLink.start(Look()) as link:
+        link.wait_ready(PATIENCE_S)
+        os.kill(link.pid, signal.SIGSTOP)
+        wait_for(lambda: link.failure)
+        assert link.failure == "the participant's screen stood still for 5 s and was ended"
+
+
 def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, maps):
     """After the press and before the answer came, as well as the clocks know; how close to it, `make soak` measures."""
     show(link, "Please wait")

@@ -136,6 +136,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
                 self.gun = message
             case view.ParticipantSeen():
                 self.participant = message
+                if message.failure:
+                    self._forget_good()
             case view.Trouble():
                 self._last(message.text, message.mood)
             case view.Ended():
@@ -166,8 +168,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         before, self.drawn = self.drawn, self.live.position
         if view.typed_there(self.about, before) and not view.typed_there(self.about, self.drawn):
             self.activateWindow()  # the participant's screen took the keys
-        if self.drawn.base is State.HALTED and before.base is not State.HALTED and self._lasting[1] == "good":
-            self._last("", "good")  # what went well before is not to stand below an emergency stop
+        if self.drawn.base is State.HALTED and before.base is not State.HALTED:
+            self._forget_good()
         if self.controls is not None:
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
@@ -175,6 +177,11 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._progress.at(self.drawn, self.clock.now())
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
+
+    def _forget_good(self) -> None:
+        """What went well before is not to stand below an emergency stop, or below what is lost."""
+        if self._lasting[1] == "good":
+            self._last("", "good")
 
     def _acknowledge(self, message: view.Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""

@@ -71,8 +71,8 @@ class Wire:
 
 _STEP_S = 0.004
 """How long the program rests between two looks at words, mouse and keys."""
-_LISTEN_S = 1.0
-"""And between two looks whether the noise plays still."""
+_BEAT_S = 1.0
+"""And between two beats, with a look whether the noise plays still."""
 
 
 def run_program(look: messages.Look, heard: BinaryIO, said: BinaryIO) -> int:
@@ -109,7 +109,7 @@ class App:
         self._keys = KeyPresses(stage.toolkit)
         self._standstills = Standstills(stage.toolkit.now)
         self._noise = MaskingNoise()
-        self._listened_s = 0.0
+        self._beat_s = 0.0
         self._told: tuple[str, ...] = ()
         self._told_s = 0.0
         self._drafts: Drafts = {}
@@ -121,6 +121,7 @@ class App:
         refresh_Hz = self._stage.measure_refresh()
         self._stage.put(MessagePage(self._stage, ""))
         self._stage.step()
+        self._wire.say(messages.Beat())
         size = f"{self._stage.width_px}x{self._stage.height_px}"
         self._wire.say(messages.Ready(psychopy=self._stage.toolkit.version, window=size, refresh_Hz=refresh_Hz))
         self._standstills.watch()
@@ -136,7 +137,7 @@ class App:
                 self._wire.say(self._stage.unasked.popleft())
             self._keys.poll()
             self._tell_keys()
-            self._tell_noise()
+            self._beat()
             self._answer()
             time.sleep(_STEP_S)
         self._noise.stop()
@@ -151,11 +152,12 @@ class App:
             if press.name in self._told:
                 self._wire.say(messages.KeyPressed(name=press.name))
 
-    def _tell_noise(self) -> None:
-        """Say, within a second, that the noise has ended."""
+    def _beat(self) -> None:
+        """Say each second that the window works, and that the noise has ended if it has."""
         now_s = self._stage.toolkit.now()
-        if now_s - self._listened_s >= _LISTEN_S:
-            self._listened_s = now_s
+        if now_s - self._beat_s >= _BEAT_S:
+            self._beat_s = now_s
+            self._wire.say(messages.Beat())
             if (ended := self._noise.ended()) is not None:
                 self._wire.say(ended)
 
@@ -172,6 +174,7 @@ class App:
             case messages.AskChoice():
                 self._stage.put(ChoicePage(self._stage, word, self._keys))
             case messages.Noise():
+                self._wire.say(messages.Beat(within_s=messages.NOISE_S))
                 self._wire.say(self._noise.turn(word))
 
     def _drafts_of(self, word: messages.AskRating | messages.AskDescription) -> Drafts:

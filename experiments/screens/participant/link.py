@@ -6,6 +6,8 @@ Questions may be asked from any thread but the one that draws the console; `canc
 
 from __future__ import annotations
 
+import math
+import queue
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,7 +20,7 @@ from pydantic import ValidationError
 from device.words import RecoilError
 from experiments.clock import RealClock
 from experiments.screens.participant import messages
-from experiments.screens.participant.messages import line
+from experiments.screens.participant.messages import NOISE_S, REPLY_S, line
 from experiments.screens.participant.process import ParticipantProcess
 
 
@@ -70,11 +72,8 @@ def clock_map(trips: Iterable[RoundTrip]) -> ClockMap:
 PINGS = 8
 """Pings of one mapping of the clocks; the shortest counts."""
 
-REPLY_S = 5.0
-"""How long the screen may take over what no person has a hand in."""
-
-NOISE_S = 15.0
-"""How long the sound system may take to start."""
+LOOK_S = 0.5
+"""How long one look for a beat takes: should this program stand still itself, that is one look and no more."""
 
 MAX_CLOCK_STEP_S = 0.02
 """How far the clocks may move against each other while a direction is asked; a clock that was set moves further."""
@@ -99,10 +98,12 @@ class ParticipantLink:
         """The question that was put on the screen last; 0 when something else was."""
         self._heard: Callable[[messages.Unasked], None] = lambda _: None
         self._gone: Callable[[str], None] = lambda _: None
+        self._beats: queue.SimpleQueue[float] = queue.SimpleQueue()
         try:
             self._process = ParticipantProcess(command, self._said, self._failed)
         except OSError as error:
             raise ParticipantError(f"the participant's screen cannot be started: {error}") from error
+        threading.Thread(target=self._watch, name="participant's beats", daemon=True).start()
 
     @classmethod
     def start(cls, look: messages.Look | None = None, *, command: Sequence[str] | None = None) -> Self:
@@ -205,6 +206,7 @@ class ParticipantLink:
         self._gone = lambda _: None
         self._process.write(line(messages.CloseScreen()))
         self._mail.fail("the participant's screen was closed by the console")
+        self._beats.put(0.0)
         self._process.end()
 
     def __enter__(self) -> Self:
@@ -261,6 +263,8 @@ class ParticipantLink:
             return
         if isinstance(word, messages.ScreenFailed):
             self._failed(f"the participant's screen failed: {word.message}")
+        elif isinstance(word, messages.Beat):
+            self._beats.put(word.within_s)
         elif isinstance(word, messages.Unasked):
             self.focused = word if isinstance(word, messages.Focused) else self.focused
             self.noise_ended = word if isinstance(word, messages.NoiseEnded) else self.noise_ended
@@ -272,8 +276,24 @@ class ParticipantLink:
         """Nothing comes from there any more; the first reason stands, and is told once."""
         first = self._mail.failure is None
         self._mail.fail(why)
+        self._beats.put(0.0)
         if first:
             self._gone(why)
+
+    def _watch(self) -> None:
+        """Wait for one beat after the other: a screen that gives none draws nothing and hears no emergency stop."""
+        within_s = self._beats.get()
+        while within_s:
+            within_s = self._beat_within(within_s)
+
+    def _beat_within(self, within_s: float) -> float:
+        """When the beat after the next one is due; 0 if none comes: the screen is ended then, and counts as gone."""
+        for _ in range(math.ceil(within_s / LOOK_S)):
+            with suppress(queue.Empty):
+                return self._beats.get(timeout=LOOK_S)
+        self._failed(f"the participant's screen stood still for {within_s:g} s and was ended")
+        self._process.kill()
+        return 0.0
 
 
 _Kind = TypeVar("_Kind", bound=messages.FromParticipant)

@@ -20,6 +20,12 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 
+REPLY_S = 5.0
+"""How long the screen may take over what no person has a hand in."""
+
+NOISE_S = 15.0
+"""How long the sound system may take to start."""
+
 BETWEEN = ENGLISH_MESSAGES.between
 """What stands between two questions: put there by the window at once, and then by the console until it asks."""
 
@@ -140,6 +146,14 @@ class Pong:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Beat:
+    """The window is drawn, and F12 heard on it; the next beat comes within a time."""
+
+    within_s: _Positive = REPLY_S
+    kind: Literal["beat"] = "beat"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RatingGiven:
     """A confirmed rating, of which 0 is one."""
 
@@ -220,7 +234,7 @@ class ScreenFailed:
 ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
 Unasked = EmergencyPressed | Focused | KeyPressed | NoiseEnded
 """What the participant's screen says without being asked."""
-FromParticipant = Ready | Pong | RatingGiven | DescriptionGiven | ChoiceGiven | NoiseIs | Unasked | ScreenFailed
+FromParticipant = Ready | Pong | Beat | RatingGiven | DescriptionGiven | ChoiceGiven | NoiseIs | Unasked | ScreenFailed
 
 _TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])
 _FROM: TypeAdapter[FromParticipant] = TypeAdapter(Annotated[FromParticipant, Field(discriminator="kind")])

@@ -54,6 +54,10 @@ class ParticipantProcess:
         """Hand over a line; a child that reads nothing keeps nobody waiting."""
         self._out.put(line)
 
+    def kill(self) -> None:
+        """End it by force, without waiting for that."""
+        self._child.kill()
+
     def end(self) -> None:
         """Close its input, then ask it to end, then kill it."""
         self._out.put(None)
