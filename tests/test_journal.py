@@ -3,8 +3,9 @@ import os
 import stat
 import subprocess
 import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import pytest
 from experiments.clock import VirtualClock
 from experiments.config.setup import sha256
 from experiments.record import storage
-from experiments.record.journal import ENDING, Journal, JournalError, head, read_journal
+from experiments.record.journal import ENDING, Journal, JournalError, JournalGone, head, read_journal
 
 PARTS = {"plan": {"trials": [1, 2]}, "setup": {"title": "é – 20 °C"}}
 HEAD = PARTS | {f"{name}_sha256": sha256(part) for name, part in PARTS.items()}
@@ -467,3 +468,32 @@ def test_a_pipe_that_is_called_a_journal_keeps_nobody_waiting(tmp_path: Path) ->
         read_journal(pipe)
     with pytest.raises(OSError, match="it is a pipe or a device, not a file"):
         storage.is_held(pipe)
+
+
+@contextmanager
+def closed(folder: Path) -> Iterator[None]:
+    """A folder that may not be looked into. Whoever may look into any is somebody else meanwhile."""
+    folder.chmod(0)
+    if is_root := os.geteuid() == 0:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if is_root:
+            os.seteuid(0)
+        folder.chmod(0o700)
+
+
+@pytest.mark.skipif(not hasattr(os, "seteuid"), reason="folders are not closed by their mode on this system")
+def test_a_journal_whose_folder_was_closed_is_not_called_deleted_and_not_written_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (home := tmp_path / "home").mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    (folder := tmp_path / "results").mkdir()
+    with Journal.create(folder / f"sub-P01_task-direction{ENDING}", VirtualClock()) as journal:
+        journal.append("run", **HEAD)
+        with closed(folder), pytest.raises(JournalGone, match=r"cannot be looked at any more \(Permission denied\)"):
+            journal.append("step", body={"number": 1})
+    assert len(read_journal(journal.path).records) == 2  # also that one, though it was not acknowledged
+    assert list(home.iterdir()) == []

@@ -244,12 +244,17 @@ class Journal:
         moved = storage.moved_to(self._descriptor)
         if moved is not None:
             return f"{what} was moved to {moved} during the run. {upto} there; resume it there"
+        unseen, lost = storage.why_not_seen(self.path), "was deleted during the run"
+        if unseen is not None:
+            lost = f"cannot be looked at any more ({unseen.strerror})"
+        if isinstance(unseen, PermissionError):  # it lies there untouched: a copy would only spread it
+            return f"{what} {lost}. {upto} in it; open the folders above it again, then go on with --resume"
         data = storage.read_open(self._descriptor, self._length)
         for path in (self.path, Path.cwd() / self.path.name, Path.home() / self.path.name):
             if _written_again(path, data):
                 how = "go on with --resume" if path == self.path else f"put it back as {self.path}, then resume"
-                return f"{what} was deleted during the run. {upto} written again to {path}; {how}"
-        return f"{what} was deleted during the run, and cannot be written anywhere else: this run is lost"
+                return f"{what} {lost}. {upto} written again to {path}; {how}"
+        return f"{what} {lost}, and cannot be written anywhere else: this run is lost"
 
     def _take_back(self) -> None:
         """Remove a record that was not acknowledged, so that the journal ends with a whole one."""

@@ -59,6 +59,17 @@ def is_at(descriptor: int, path: Path) -> bool:
     return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
 
 
+def why_not_seen(path: Path) -> OSError | None:
+    """Why nobody can look at a file that may be there still: a closed folder, a lost share. `None` if it is not there."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        return error
+    return None
+
+
 def moved_to(descriptor: int) -> Path | None:
     """Where an open file lies now, where the system tells (Linux); `None` if it was deleted."""
     try:
