@@ -180,7 +180,7 @@ def test_one_refusal_names_file_place_key_value_and_rule(folder: Path, broken: B
 
 
 def test_observers_who_do_not_heed_instructions_need_no_boundary(folder: Path) -> None:
-    edit(folder / HURRY, "hurry-felt.toml", "hurry.toml")
+    edit(folder / HURRY, "hurry-felt.toml", "direction.toml")
     edit(folder / HURRIED, ", accuracy = 2.2", "")
     assert load_setup(str(folder / HURRY)).config.factors["instruction"].levels == ("speed", "neutral", "accuracy")
 

@@ -22,7 +22,7 @@ from matplotlib.text import Text
 from analysis.logs.column_map import ColumnMap
 from analysis.logs.reading import read_logs
 from analysis.report.figures import glyphs, style
-from analysis.report.figures.style import method_line, method_marker
+from analysis.report.figures.style import drawn_name, method_line, method_marker
 from analysis.report.labels import cut_names, display_name, labelled, lines_of, text_columns
 from analysis.report.section import Section, Table
 from analysis.report.streams import plain_letter
@@ -34,6 +34,7 @@ from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import write_figures
 from analysis.summary.sections.sections import sections
+from analysis.summary.sections.shown_trades import shown_trades
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import result_tables
 from experiments.clock import VirtualClock
@@ -285,8 +286,10 @@ def test_ten_methods_make_figures_in_which_nothing_that_is_written_touches(
     assert ten.direction is not None
     with labelled(labels, TEN):
         figure_8(ten, tmp_path / "never")
-        for draw in (figure_directions, figure_response_times, figure_conditional_accuracy):
+        for draw in (figure_directions, figure_response_times):
             draw(ten.direction, tmp_path / "never")
+        (shown,) = shown_trades(ten, drawn_name)
+        figure_conditional_accuracy(shown.trade, shown.names, tmp_path / "never")
     for figure in drawn:
         assert figure_files.touching(figure) == []
         assert any(text.get_text().startswith("[1] a name") for text in figure.texts) is (labels is MIXED)

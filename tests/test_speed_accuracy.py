@@ -26,7 +26,8 @@ from analysis.summary.figures.trade import (
 )
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
-from analysis.summary.sections.pictures import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, write_figures
+from analysis.summary.sections.pictures import write_figures
+from analysis.summary.sections.shown_trades import shown_trades
 from analysis.summary.sections.trade import trade_details, trade_sections
 from analysis.summary.summary import summarize
 from analysis.times import trade
@@ -247,9 +248,10 @@ def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path:
     assert "all times came from the experimenter's hand" in text
     assert "Refused of 120 answered trials: 120 because the time came from the experimenter's hand" in text
     assert not section.pictures
+    (shown,) = shown_trades(statistics)
     for figure in (figure_conditional_accuracy, figure_quantile_probability):
         with pytest.raises(ValueError, match="needs somebody"):
-            figure(statistics.direction, tmp_path / "none")
+            figure(shown.trade, shown.names, tmp_path / "none")
 
 
 def test_single_times_that_are_nobodys_own_are_counted_by_reason(tmp_path: Path) -> None:
@@ -376,7 +378,8 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
     told = [text for section in sections for text in section.paragraphs]
     cells = [*told, *(cell for one in sections for table in one.tables for row in table.rows for cell in row)]
     assert not [cell for cell in cells if re.search(r"\b(nan|None|inf)\b", cell)]
-    drawn = ((CONDITIONAL_ACCURACY, has_curve(found)), (QUANTILE_PROBABILITY, has_points(found)))
+    (trade_of,) = shown_trades(statistics)
+    drawn = zip(trade_of.stems, (has_curve(found.speed_accuracy), has_points(found.speed_accuracy)), strict=True)
     shown = {picture.stem for section in sections for picture in section.pictures}
     assert shown - {"figure-response-times"} == {stem for stem, there in drawn if there}
     fits = statistics.to_dict()["direction"]["speed_accuracy"].get("diffusion") or {"together": None}
@@ -389,9 +392,9 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
     write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
-    found = summarize(read_logs([tmp_path])).direction
-    figure_conditional_accuracy(found, tmp_path / "curve")
-    figure_quantile_probability(found, tmp_path / "points")
+    (found,) = shown_trades(summarize(read_logs([tmp_path])))
+    figure_conditional_accuracy(found.trade, found.names, tmp_path / "curve")
+    figure_quantile_probability(found.trade, found.names, tmp_path / "points")
     assert all((tmp_path / f"{name}.png").is_file() for name in ("curve", "points"))
 
 
@@ -480,7 +483,7 @@ def test_a_crowd_is_fitted_by_a_sample_of_people_whose_codes_are_evenly_spaced(t
 
 def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistics, tmp_path: Path) -> None:
     measured, made_of_it = sections_of(statistics)
-    stems = ["figure-response-times", CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY]
+    stems = ["figure-response-times", "figure-conditional-accuracy", "figure-quantile-probability"]
     assert [picture.stem for picture in measured.pictures] == stems
     assert made_of_it.appendix
     assert made_of_it.folded
@@ -490,7 +493,7 @@ def test_the_section_shows_figures_tables_and_caveats(statistics: StudyStatistic
         "## Speed and accuracy",
         "1,080 of 1,080 answered trials have a time of the answerer's own hand (6 participants).",
         "| Vibration, speed | 180 |",
-        "| speed − accuracy | all methods | 6 |",
+        "| speed − accuracy | all conditions | 6 |",
         "Not to be trusted above about 10 % errors",
         "cannot be compared between studies",
         "| drift Asymmetric Force II | 1/√s |",

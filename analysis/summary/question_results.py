@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from analysis.report.serial import OPTIONAL, UNWRITTEN
 from analysis.summary.pairs import PairedComparison
 from analysis.summary.thresholds import Thresholds
+from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 from experiments.design.language import Level
 
 
@@ -65,6 +66,7 @@ class QuestionSummary:
     `preferred`: of pairs, how often each level was chosen of all trials that had it, a tie as half, in the mean over
     people. `scale`: the ends of a rating, with their words, or what rank 1 means. `thresholds`: the psychometric
     functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
+    `speed_accuracy`: of a question with two answers of which one is right; its `methods` are the conditions.
     `held`: its share of successes is where a procedure held it, which chose the levels by the answers. `not_above_0`:
     how many numbers have no logarithm, and so stand in no mean; `None` without any.
     """
@@ -78,6 +80,7 @@ class QuestionSummary:
     scale: str | None = field(default=None, metadata=OPTIONAL)
     thresholds: Thresholds | None = field(default=None, metadata=OPTIONAL)
     pairs: PairedComparison | None = field(default=None, metadata=OPTIONAL)
+    speed_accuracy: SpeedAccuracy | NoSpeedAccuracy | None = field(default=None, metadata=OPTIONAL)
     held: bool = field(default=False, metadata=UNWRITTEN)
     not_above_0: int | None = field(default=None, metadata=OPTIONAL)
 

@@ -49,6 +49,7 @@ from analysis.stats.paired import (
 )
 from analysis.summary import results
 from analysis.summary.assumptions import assumptions, not_spherical
+from analysis.summary.design_times import timed_designs
 from analysis.summary.designs import origin_of, summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
@@ -90,9 +91,8 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
         labels=_labels((direction, preference), names),
     )
     tell("statistics")
-    if direction is not None and trade:
-        direction = _timed(direction, logs.trials, names, fits=fits)
-        found = replace(found, direction=direction)
+    if trade:
+        found = _timed(found, logs, fits=fits)
     tell("fits")
     apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
     said = (*_hasty(logs.trials), *_repeated(logs.ratings), *_warnings(found))
@@ -201,12 +201,13 @@ def _complete(
     return complete, methods, left_out
 
 
-def _timed(
-    found: results.DirectionStatistics, table: pd.DataFrame, names: MethodNames, *, fits: bool
-) -> results.DirectionStatistics:
+def _timed(found: results.StudyStatistics, logs: Logs, *, fits: bool) -> results.StudyStatistics:
     """With the measures of speed and accuracy."""
-    complete, methods, _ = _complete(table, "direction", names)
-    return replace(found, speed_accuracy=speed_accuracy(complete, methods, fits=fits))
+    direction = found.direction
+    if direction is not None:
+        complete, methods, _ = _complete(logs.trials, "direction", logs.methods)
+        direction = replace(direction, speed_accuracy=speed_accuracy(complete, methods, fits=fits))
+    return replace(found, direction=direction, designs=timed_designs(found.designs, logs.designs, fits=fits))
 
 
 def _direction(table: pd.DataFrame, names: MethodNames) -> tuple[results.DirectionStatistics, list[LeftOut]]:

@@ -1,4 +1,4 @@
-"""The speed-accuracy trade-off of experiment 1: `direction.speed_accuracy` of `statistics.json`, as typed results."""
+"""The speed-accuracy trade-off of experiment 1, and of questions with a right answer, as in `statistics.json`."""
 
 from __future__ import annotations
 
@@ -51,14 +51,15 @@ CAVEATS = {
     "balanced_integration": "z of the correct rate less z of the mean time of the correct answers, over this table's "
     "people and cells: it has mean 0, cannot be compared between studies, and weighs speed and accuracy alike by "
     "decree (Liesefeld & Janczyk 2019).",
-    "ez": "EZ-diffusion, each person and cell alone: no bias (both directions together), no lapses, the correct "
+    "ez": "EZ-diffusion, each person and cell alone: no bias (both answers together), no lapses, the correct "
     f"answers' times. Left out are people with fewer than {FEWEST_CORRECT} correct answers, with equal times, or with "
     "a non-decision time below 0. With 20 trials a cell the boundary comes out 1 to 6 % too small, the drift up to 10 "
     "% too large and the non-decision time 10 to 50 ms too long.",
-    "diffusion": "A drift for each method (backward shots with its negative), a boundary for each instruction, one "
-    "start (the share of the way towards the answer forward) and one non-decision time; no lapses, no variability "
-    "between trials. Each person's own fit, then the mean over people: the one to read. With 60 trials a person its "
-    "non-decision time is about 10 ms too long and its drifts are some percent too large.",
+    "diffusion": "A drift for each method or condition (its negative where the second answer is right, as of backward "
+    "shots), a boundary for each instruction, one start (the share of the way towards the first answer, as forward) "
+    "and one non-decision time; no lapses, no variability between trials. Each person's own fit, then the mean over "
+    "people: the one to read. With 60 trials a person its non-decision time is about 10 ms too long and its drifts are "
+    "some percent too large.",
     "together": "All trials in one fit, as if everybody were the same person, with intervals from the spread between "
     "people. Where people differ it is biased and its intervals are too short. In 200 simulated studies with people "
     "who differ by an SD of 20 % in drift and 10 % in boundary and non-decision time, it pulled a drift of 1.80 by "
@@ -104,7 +105,7 @@ class EZMeans:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellTrade:
-    """The measures of a method under an instruction."""
+    """The measures of a method, or of another condition, under an instruction."""
 
     n: int
     accuracy: Mean
@@ -178,7 +179,10 @@ class NoSpeedAccuracy(_UsedTrials):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedAccuracy(_UsedTrials):
-    """The measures by method and instruction, as far as there are such trials, over times of the answerer's own."""
+    """The measures by method and instruction, as far as there are such trials, over times of the answerer's own.
+
+    Of a design's question conditions stand for methods, named by their factors: `method vibration, grip loose`.
+    """
 
     quantiles: tuple[float, ...]
     methods: Mapping[str, Mapping[str, CellTrade]]

@@ -60,7 +60,7 @@ def is_at(descriptor: int, path: Path) -> bool:
 
 
 def why_not_seen(path: Path) -> OSError | None:
-    """Why nobody can look at a file that may be there still: a closed folder, a lost share. `None` if it is not there."""
+    """Why nobody can look at a file that may be there still, as in a closed folder; `None` if it is not there."""
     try:
         path.stat()
     except (FileNotFoundError, NotADirectoryError):

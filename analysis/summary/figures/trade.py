@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -38,7 +38,7 @@ from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import CellTrade, NoSpeedAccuracy, SpeedAccuracy
 
 _Cells = Sequence[tuple[int, CellTrade]]
-"""One instruction's cells, each with the place of its method, which has its colour and mark from there."""
+"""One instruction's cells, each with the place of its condition, which has its colour and mark from there."""
 
 _ACROSS = 3
 """So many panels stand side by side."""
@@ -53,7 +53,7 @@ class _Draw(Protocol):
 class _Panel:
     """What is drawn in each panel, and how far the axes go that all share.
 
-    `kinds`: fill and name of the marks that the legend explains beside the methods.
+    `kinds`: fill and name of the marks that the legend explains beside the conditions.
     """
 
     draw: _Draw
@@ -64,48 +64,61 @@ class _Panel:
     kinds: Sequence[tuple[str, str]] = ()
 
 
-def figure_conditional_accuracy(found: DirectionStatistics, path_stem: Path) -> None:
-    """Accuracy over response time, a line a method, a panel an instruction; PNG, SVG and PDF are written.
+Trade = SpeedAccuracy | NoSpeedAccuracy | None
+"""The measures, or why there are none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TradeNames:
+    """What conditions, in their order, and instructions are called."""
+
+    conditions: Mapping[str, str]
+    instructions: Mapping[str, str]
+
+
+def figure_conditional_accuracy(trade: Trade, names: TradeNames, path_stem: Path) -> None:
+    """Accuracy over response time, a line a condition, a panel an instruction; PNG, SVG and PDF are written.
 
     `ValueError` if nobody has a trial in every bin.
     """
-    if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_curve(found):
+    if not isinstance(trade, SpeedAccuracy) or not has_curve(trade):
         raise ValueError("the figure of conditional accuracy needs somebody with a trial in every bin")
-    _panels(found.methods, found.speed_accuracy, path_stem, _CURVES)
+    _panels(names, trade, path_stem, _CURVES)
 
 
-def figure_quantile_probability(found: DirectionStatistics, path_stem: Path) -> None:
+def figure_quantile_probability(trade: Trade, names: TradeNames, path_stem: Path) -> None:
     """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
 
     `ValueError` if nobody has enough answers of a kind.
     """
-    if not isinstance(found.speed_accuracy, SpeedAccuracy) or not has_points(found):
+    if not isinstance(trade, SpeedAccuracy) or not has_points(trade):
         raise ValueError("the quantile-probability plot needs somebody with five answers of a kind")
-    _panels(found.methods, found.speed_accuracy, path_stem, _POINTS)
+    _panels(names, trade, path_stem, _POINTS)
 
 
-def has_curve(found: DirectionStatistics) -> bool:
+def has_curve(trade: Trade) -> bool:
     """Whether there is a conditional accuracy function to draw."""
-    return any(cell.conditional_accuracy.people for cell in _cells_of(found.speed_accuracy))
+    return any(cell.conditional_accuracy.people for cell in _cells_of(trade))
 
 
-def has_points(found: DirectionStatistics) -> bool:
+def has_points(trade: Trade) -> bool:
     """Whether there is a point of a quantile-probability plot."""
-    return any(any(cell.quantile_probability.people) for cell in _cells_of(found.speed_accuracy))
+    return any(any(cell.quantile_probability.people) for cell in _cells_of(trade))
 
 
-def _cells_of(trade: SpeedAccuracy | NoSpeedAccuracy | None) -> list[CellTrade]:
+def _cells_of(trade: Trade) -> list[CellTrade]:
     if trade is None:
         return []
     return [cell for by_instruction in trade.methods.values() for cell in by_instruction.values()]
 
 
-def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> None:
-    """A panel an instruction on shared axes, the methods' legend above all."""
+def _panels(names: TradeNames, trade: SpeedAccuracy, path_stem: Path, panel: _Panel) -> None:
+    """A panel an instruction on shared axes, the conditions' legend above all."""
+    places = {name: place for place, name in enumerate(names.conditions)}
     instructions = [i for i in trade.instructions if any(i in one for one in trade.methods.values())]
     columns = min(_ACROSS, len(instructions))
     rows = -(-len(instructions) // columns)
-    shown = [(i, method) for i, method in enumerate(methods) if method in trade.methods]
+    shown = [(places[name], called) for name, called in names.conditions.items() if name in trade.methods]
     width = 5.8 if columns == 1 else 0.6 + 3.3 * columns
     handles = [*_handles(shown, lines=panel.lines), *_kinds(panel)]
     across = legend_columns(width, [str(handle.get_label()) for handle in handles])
@@ -116,24 +129,26 @@ def _panels(methods: Sequence[str], trade: SpeedAccuracy, path_stem: Path, panel
             spare.set_visible(False)
         for k, (axes, instruction) in enumerate(zip(grid, instructions, strict=False)):
             light_grid(axes)
-            told = [(methods.index(m), one[instruction]) for m, one in trade.methods.items() if instruction in one]
+            told = [(places[m], one[instruction]) for m, one in trade.methods.items() if instruction in one]
             panel.draw(axes, told, trade, last=(k + 1) % columns == 0)
             axes.tick_params(labelbottom=True)
             axes.set_xlabel(panel.across)
             axes.set_ylabel("" if k % columns else panel.upward)
             if len(instructions) > 1:
-                title = textwrap.shorten(f"({chr(ord('a') + k)}) {instruction}", 36, placeholder=" ...")
+                title = textwrap.shorten(
+                    f"({chr(ord('a') + k)}) {names.instructions[instruction]}", 36, placeholder=" ..."
+                )
                 axes.set_title(title, loc="left", fontweight="bold", parse_math=False)
         panel.limit(grid[0], trade)
         long = 4.5 if len(shown) > MANY_METHODS else None
         figure.legend(handles=handles, loc="outside upper center", ncols=across, frameon=False, handlelength=long)
 
 
-def _handles(methods: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
-    """The methods by colour, mark and, where there are lines, line."""
+def _handles(names: Sequence[tuple[int, str]], *, lines: bool) -> list[Line2D]:
+    """The conditions by colour, mark and, where there are lines, line."""
     return [
-        Line2D([], [], **look, markersize=5.5, label=drawn_name(method))
-        for i, method in methods
+        Line2D([], [], **look, markersize=5.5, label=name)
+        for i, name in names
         for look in [method_look(i) if lines else method_look(i) | {"linestyle": "none"}]
     ]
 
@@ -186,33 +201,57 @@ def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
                     zorder=3.0,
                     clip_on=False,
                 )
-    _join(axes, columns, trade.quantiles)
+    _join(axes, columns, trade)
     axes.axvline(0.5, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
 
 
 def _limit_points(axes: Axes, trade: SpeedAccuracy) -> None:
-    slowest = np.nanmax([cell.quantile_probability.quantiles_s for cell in _cells_of(trade)])
     axes.set_xlim(0.0, 1.0)
-    axes.set_ylim(0.0, 1.05 * slowest)
+    axes.set_ylim(0.0, _highest(trade))
 
 
-def _join(axes: Axes, columns: Sequence[tuple[float, Sequence[float]]], shares: Sequence[float]) -> None:
-    """Lines through equal quantiles in the order of their probabilities, each named."""
+def _highest(trade: SpeedAccuracy) -> float:
+    """The end of the axis of quantiles."""
+    return float(1.05 * np.nanmax([cell.quantile_probability.quantiles_s for cell in _cells_of(trade)]))
+
+
+def _join(axes: Axes, columns: Sequence[tuple[float, Sequence[float]]], trade: SpeedAccuracy) -> None:
+    """Lines through equal quantiles in the order of their probabilities, named where there is room for it."""
     ordered = sorted(columns, key=lambda column: column[0])
-    for k, share in enumerate(shares):
+    for k in range(len(trade.quantiles)):
         heights = [quantiles[k] for _, quantiles in ordered]
         axes.plot([probability for probability, _ in ordered], heights, color="#999999", linewidth=0.8, zorder=2.0)
-        if heights:
-            axes.annotate(
-                f"{100.0 * share:.0f} %",
-                xy=(ordered[-1][0], heights[-1]),
-                xytext=(6.0, 0.0),
-                textcoords="offset points",
-                va="center",
-                fontsize=7.5,
-                color=BLACK,
-                annotation_clip=False,
-            )
+    if not ordered:
+        return
+    probability, ends = ordered[-1]
+    for k in _named_lines(ends, _LINE_OF_TEXT * _highest(trade)):
+        axes.annotate(
+            f"{100.0 * trade.quantiles[k]:.0f} %",
+            xy=(probability, ends[k]),
+            xytext=(6.0, 0.0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.5,
+            color=BLACK,
+            annotation_clip=False,
+        )
+
+
+_LINE_OF_TEXT = 0.05
+"""A line of small text is so much of the height of a panel."""
+
+
+def _named_lines(ends: Sequence[float], apart: float) -> list[int]:
+    """Which of some lines are named at their ends: the lowest, then each that is far enough above the last one.
+
+    >>> _named_lines([0.1, 0.2, 0.5, 0.6], 0.2)
+    [0, 2]
+    """
+    named = [0]
+    for k in range(1, len(ends)):
+        if ends[k] - ends[named[-1]] >= apart:
+            named.append(k)
+    return named
 
 
 _CURVES = _Panel(

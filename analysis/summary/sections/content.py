@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,9 +11,12 @@ from typing import TYPE_CHECKING
 from analysis.logs.files import Problem
 from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
+from analysis.report.labels import display_name, named
 from analysis.report.section import Section
 from analysis.summary.delivered import DeliveredCourse
-from analysis.summary.results import StudyStatistics, WithinStatistics
+from analysis.summary.results import DesignSummary, StudyStatistics, WithinStatistics
+from experiments.design.language import shown_level
+from experiments.design.methods_section import factor_words
 from experiments.study.study import Member
 
 if TYPE_CHECKING:
@@ -73,3 +77,27 @@ _SPELLED_OUT = 4
 def has_many(found: WithinStatistics) -> bool:
     """Whether there are too many methods to name each of them, and each pair, in a sentence."""
     return len(found.methods) > _SPELLED_OUT
+
+
+_WITH_UNIT = re.compile(r"[A-Za-z]\w*_(?:V|s|N|A|ohm|m|kg|Hz)\b")
+
+
+def effect_words(effect: str) -> str:
+    """What a test is of, in words.
+
+    >>> effect_words("voltage_V × method"), effect_words("vibration – asymmetric-1")
+    ('voltage in V × method', 'Vibration – Asymmetric Force I')
+    """
+    return _WITH_UNIT.sub(lambda found: factor_words(found[0]), named(effect))
+
+
+def condition_words(found: DesignSummary, condition: str, word: Callable[[str], str] = display_name) -> str:
+    """A condition, as results name it, with each level by what that is called; else in words, as an effect."""
+    return ", ".join(_part_words(found, part, word) for part in condition.split(", "))
+
+
+def _part_words(found: DesignSummary, part: str, word: Callable[[str], str]) -> str:
+    name, _, shown = part.partition(" ")
+    factor = name if name in found.factors else name.removesuffix("_1").removesuffix("_2")
+    levels = {shown_level(level): level for level in found.factors.get(factor, ())}
+    return word(found.label(name, levels[shown])) if shown in levels else effect_words(part)

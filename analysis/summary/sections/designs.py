@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
-from analysis.report.labels import display_name, named
+from analysis.report.labels import display_name
 from analysis.report.section import Picture, Section, Table
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary
-from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData
+from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData, condition_words, effect_words
 from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
@@ -200,18 +199,6 @@ def _exponent_words(test: DesignTest, *, exact: bool) -> str:
 def _mean_and_interval(test: DesignTest) -> str:
     interval = "" if test.ci_low is None else f", 95 % CI {apa.interval(test.ci_low, test.ci_high)}"
     return f"M = {apa.number(test.statistic)}{interval}"
-
-
-_WITH_UNIT = re.compile(r"[A-Za-z]\w*_(?:V|s|N|A|ohm|m|kg|Hz)\b")
-
-
-def effect_words(effect: str) -> str:
-    """What a test is of, in words.
-
-    >>> effect_words("voltage_V × method"), effect_words("vibration – asymmetric-1")
-    ('voltage in V × method', 'Vibration – Asymmetric Force I')
-    """
-    return _WITH_UNIT.sub(lambda found: factor_words(found[0]), named(effect))
 
 
 _LISTED = 15
@@ -408,20 +395,12 @@ def _test(found: DesignSummary, question: QuestionSummary, test: DesignTest) -> 
     return (_TESTS.get(test.name, test.name), _effect(found, test), apa.number(test.statistic), df, p, more)
 
 
-def _condition_part(found: DesignSummary, part: str) -> str:
-    """A factor's level by what that is called; else an effect in words."""
-    name, _, shown = part.partition(" ")
-    factor = name if name in found.factors else name.removesuffix("_1").removesuffix("_2")
-    levels = {shown_level(level): level for level in found.factors.get(factor, ())}
-    return display_name(found.label(name, levels[shown])) if shown in levels else effect_words(part)
-
-
 def _effect(found: DesignSummary, test: DesignTest) -> str:
     """What was tested; of a pair both levels by what they are called."""
     if test.name in _SENSITIVITY and " " not in test.effect:
         return "all conditions"
     if test.name != "tukey":
-        return ", ".join(_condition_part(found, part) for part in test.effect.split(", "))
+        return condition_words(found, test.effect)
     return _pair(found, test.effect)
 
 

@@ -12,6 +12,7 @@ from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.figures.glyphs import is_drawable
 from analysis.report.figures.shot import ShotPanel, figure_5
+from analysis.report.figures.style import drawn_name
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
 from analysis.summary.figures.delivered import figure_delivered
@@ -30,12 +31,12 @@ from analysis.summary.figures.trade import (
 from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
 from analysis.summary.sections.delivered import DELIVERED_FIGURE
+from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
 from analysis.times.own_trials import TimeSpread
 from experiments.record.tables import is_rated
 
 _SHOT_FIGURE, _RESULTS_FIGURE = "figure-shot", "figure-results"
 _DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
-CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY = "figure-conditional-accuracy", "figure-quantile-probability"
 
 _PANELS = " (a), sensitivity d′ (b) and criterion c (c)"
 _ALWAYS_RIGHT = ", the absence of bias, and the d′ of somebody who is always right (log-linear correction)"
@@ -51,9 +52,12 @@ def write_figures(folder: Path, report: ReportData) -> None:
         figure_8(statistics, folder / _RESULTS_FIGURE, report.rated_from)
     if direction is not None and direction.n:
         _write_direction(folder, direction)
-    for name, one in ((name, _drawable(found)) for name, found in statistics.designs.items()):
+    designs = {name: _drawable(found) for name, found in statistics.designs.items()}
+    for name, one in designs.items():
         _write_design(folder, name, one)
         _write_models(folder, name, one)
+    for shown in shown_trades(replace(statistics, designs=designs), drawn_name):
+        _write_trade(folder, shown)
     if report.delivered:
         figure_delivered(report.delivered, folder / DELIVERED_FIGURE)
 
@@ -76,10 +80,14 @@ def _write_direction(folder: Path, direction: DirectionStatistics) -> None:
     figure_directions(direction, folder / _DIRECTIONS_FIGURE)
     if direction.response_times.n:
         figure_response_times(direction, folder / _TIMES_FIGURE)
-    if has_curve(direction):
-        figure_conditional_accuracy(direction, folder / CONDITIONAL_ACCURACY)
-    if has_points(direction):
-        figure_quantile_probability(direction, folder / QUANTILE_PROBABILITY)
+
+
+def _write_trade(folder: Path, shown: ShownTrade) -> None:
+    curve, points = shown.stems
+    if has_curve(shown.trade):
+        figure_conditional_accuracy(shown.trade, shown.names, folder / curve)
+    if has_points(shown.trade):
+        figure_quantile_probability(shown.trade, shown.names, folder / points)
 
 
 def _write_models(folder: Path, name: str, design: DesignSummary) -> None:

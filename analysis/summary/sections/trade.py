@@ -5,43 +5,41 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from analysis.report import apa
-from analysis.report.labels import display_name
 from analysis.report.section import Picture, Section, Table
-from analysis.summary.figures.trade import has_curve, has_points
-from analysis.summary.results import DirectionStatistics
+from analysis.summary.figures.trade import TradeNames, has_curve, has_points
 from analysis.summary.sections.content import ReportData
-from analysis.summary.sections.pictures import CONDITIONAL_ACCURACY, QUANTILE_PROBABILITY, response_times_picture
+from analysis.summary.sections.pictures import response_times_picture
+from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
 from analysis.times.people import Mean
 from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
 from device.words import how_many
 
 _UNITS = {"drift": "1/√s", "boundary": "√s", "start": "0 to 1", "non_decision_s": "s"}
-_WORDS = {"start": "start (towards forward)", "non_decision_s": "non-decision time"}
 
 
-def cells_of(trade: SpeedAccuracy) -> Iterator[tuple[str, CellTrade]]:
-    """Each cell under its method's name in print, with the instruction where there are several."""
+def cells_of(trade: SpeedAccuracy, names: TradeNames) -> Iterator[tuple[str, CellTrade]]:
+    """Each cell under its condition's name in print, with the instruction where there are several."""
     several = len(trade.instructions) > 1
-    for method, cells in trade.methods.items():
+    for condition, cells in trade.methods.items():
         for instruction, cell in cells.items():
-            yield display_name(method) + (f", {instruction}" if several else ""), cell
+            yield names.conditions[condition] + (f", {names.instructions[instruction]}" if several else ""), cell
 
 
-def trade_tables(trade: SpeedAccuracy) -> Iterator[Table]:
+def trade_tables(trade: SpeedAccuracy, names: TradeNames) -> Iterator[Table]:
     """What was measured; a table without rows has nothing to say."""
-    yield _accuracy(trade)
-    yield _effects(trade)
+    yield _accuracy(trade, names)
+    yield _effects(trade, names)
 
 
-def model_tables(trade: SpeedAccuracy) -> Iterator[Table]:
+def _model_tables(shown: ShownTrade, trade: SpeedAccuracy) -> Iterator[Table]:
     """What scores and models make of it."""
-    yield _scores(trade)
-    yield _ez(trade)
+    yield _scores(trade, shown.names)
+    yield _ez(trade, shown.names)
     if not trade.diffusion.reason:
-        yield _diffusion(trade)
+        yield _diffusion(trade, shown)
 
 
-def _accuracy(trade: SpeedAccuracy) -> Table:
+def _accuracy(trade: SpeedAccuracy, names: TradeNames) -> Table:
     return Table(
         caption="Accuracy and response time: means over participants with 95 % intervals",
         header=("Condition", "Trials", "Correct [%]", "Mean time [s]", "Median time [s]"),
@@ -53,19 +51,19 @@ def _accuracy(trade: SpeedAccuracy) -> Table:
                 _mean(cell.mean_s, 3),
                 _mean(cell.median_s, 3),
             )
-            for name, cell in cells_of(trade)
+            for name, cell in cells_of(trade, names)
         ),
     )
 
 
-def _scores(trade: SpeedAccuracy) -> Table:
+def _scores(trade: SpeedAccuracy, names: TradeNames) -> Table:
     return Table(
         caption="Scores that join speed and accuracy: means over participants with 95 % intervals, inverse efficiency "
         "(participants with a correct answer) and balanced integration (with one in every condition)",
         header=("Condition", "Participants", "IES [s]", "Participants", "BIS"),
         rows=tuple(
             (name, *_counted(cell.inverse_efficiency_s, 3), *_counted(cell.balanced_integration, 2))
-            for name, cell in cells_of(trade)
+            for name, cell in cells_of(trade, names)
         ),
     )
 
@@ -87,15 +85,15 @@ def _ends(one: Mean | Parameter, digits: int, scale: float = 1.0) -> str:
     return apa.interval(low, high, digits)
 
 
-def _effects(trade: SpeedAccuracy) -> Table:
+def _effects(trade: SpeedAccuracy, names: TradeNames) -> Table:
     return Table(
         caption="Effect of the instruction, paired by participant: mean difference with 95 % interval, not corrected "
         "for the number of pairs; positive where the first has more",
-        header=("Instructions", "Method", "Participants", "Correct [percentage points]", "Mean time [s]"),
+        header=("Instructions", "Condition", "Participants", "Correct [percentage points]", "Mean time [s]"),
         rows=tuple(
             (
-                f"{one.a} − {one.b}",
-                "all methods" if one.method is None else display_name(one.method),
+                f"{names.instructions[one.a]} − {names.instructions[one.b]}",
+                "all conditions" if one.method is None else names.conditions[one.method],
                 f"{one.accuracy.people:,}",
                 _mean(one.accuracy, 1, 100.0),
                 _mean(one.mean_s, 3),
@@ -106,7 +104,7 @@ def _effects(trade: SpeedAccuracy) -> Table:
     )
 
 
-def _ez(trade: SpeedAccuracy) -> Table:
+def _ez(trade: SpeedAccuracy, names: TradeNames) -> Table:
     return Table(
         caption="EZ-diffusion by participant: means with 95 % intervals over participants",
         header=("Condition", "Participants", "Drift [1/√s]", "Boundary [√s]", "Non-decision time [s]", "Left out"),
@@ -119,7 +117,7 @@ def _ez(trade: SpeedAccuracy) -> Table:
                 _mean(cell.ez.non_decision_s, 3),
                 _left_out(cell.ez.left_out),
             )
-            for name, cell in cells_of(trade)
+            for name, cell in cells_of(trade, names)
         ),
     )
 
@@ -133,17 +131,18 @@ def _left_out(people: EZLeftOut) -> str:
     return ", ".join(f"{count:,} ({why})" for why, count in counts.items() if count) or "none"
 
 
-def _diffusion(trade: SpeedAccuracy) -> Table:
+def _diffusion(trade: SpeedAccuracy, shown: ShownTrade) -> Table:
     each = trade.diffusion.each.estimates if trade.diffusion.each else {}
     together = trade.diffusion.together.estimates if trade.diffusion.together else {}
-    order = [*(f"drift {m}" for m in trade.methods), *(f"boundary {i}" for i in trade.instructions), *_WORDS]
+    drifts, boundaries = (f"drift {one}" for one in trade.methods), (f"boundary {one}" for one in trade.instructions)
+    order = (*drifts, *boundaries, "start", "non_decision_s")
     return Table(
         caption="Diffusion model by maximum likelihood: mean over participants' own fits, SD of these, and the fit of "
         "all trials together, which is biased where people differ; 95 % intervals",
         header=("Parameter", "Unit", "Participants", "Mean of own fits", "95 % CI", "SD", "Together", "95 % CI"),
         rows=tuple(
             (
-                _parameter(name),
+                _parameter(name, shown),
                 _UNITS[name.partition(" ")[0]],
                 *_of_each(each.get(name), _digits(name)),
                 *_of_all(together.get(name), _digits(name)),
@@ -168,14 +167,14 @@ def _of_all(one: Parameter | None, digits: int) -> tuple[str, str]:
     return (apa.NO_NUMBER, apa.NO_NUMBER) if one is None else (apa.number(one.value, digits), _ends(one, digits))
 
 
-def _parameter(name: str) -> str:
-    """A parameter's name in print.
-
-    >>> _parameter("drift asymmetric-1"), _parameter("start")
-    ('drift Asymmetric Force I', 'start (towards forward)')
-    """
+def _parameter(name: str, shown: ShownTrade) -> str:
+    """A parameter's name in print."""
     kind, _, of = name.partition(" ")
-    return _WORDS.get(name, f"drift {display_name(of)}" if kind == "drift" else name)
+    if kind == "drift":
+        return f"drift {shown.names.conditions[of]}"
+    if kind == "boundary":
+        return f"boundary {shown.names.instructions[of]}"
+    return {"start": f"start (towards {shown.first})"}.get(name, "non-decision time")
 
 
 TITLE = "Speed and accuracy"
@@ -184,50 +183,60 @@ DETAILS = "Speed and accuracy: scores and models"
 
 def trade_sections(report: ReportData) -> Iterator[Section]:
     """Accuracy and times, or the sentence why there is nothing to show."""
-    found = report.statistics.direction
-    trade = None if found is None else found.speed_accuracy
-    if isinstance(trade, NoSpeedAccuracy):
-        yield Section(title=TITLE, paragraphs=(trade.reason or "", *_refused(trade)))
-    elif found is not None and trade is not None:
-        times = response_times_picture(found)
-        yield Section(
-            title=TITLE,
-            paragraphs=(_used(found, trade), trade.caveats["means"], *_unpaired(trade)),
-            pictures=(*((times,) if times else ()), *trade_pictures(found, trade)),
-            tables=tuple(table for table in trade_tables(trade) if table.rows),
-        )
+    for shown in shown_trades(report.statistics):
+        title, trade = _titled(TITLE, shown), shown.trade
+        if isinstance(trade, NoSpeedAccuracy):
+            yield Section(title=title, paragraphs=(trade.reason or "", *_refused(trade)))
+        elif trade is not None:
+            times = _times_picture(report) if not shown.of else ()
+            yield Section(
+                title=title,
+                paragraphs=(_used(shown, trade), trade.caveats["means"], *_unpaired(trade)),
+                pictures=(*times, *trade_pictures(shown, trade)),
+                tables=tuple(table for table in trade_tables(trade, shown.names) if table.rows),
+            )
+
+
+def _titled(title: str, shown: ShownTrade) -> str:
+    return f"{title} ({shown.of})" if shown.of else title
+
+
+def _times_picture(report: ReportData) -> tuple[Picture, ...]:
+    direction = report.statistics.direction
+    times = None if direction is None else response_times_picture(direction)
+    return (times,) if times else ()
 
 
 def trade_details(report: ReportData) -> Iterator[Section]:
     """The appendix' scores and models of the same trials."""
-    found = report.statistics.direction
-    trade = None if found is None else found.speed_accuracy
-    if isinstance(trade, SpeedAccuracy):
-        caveats = trade.caveats
-        yield Section(
-            title=DETAILS,
-            paragraphs=(
-                f"Inverse efficiency score (IES): {_lower(caveats['inverse_efficiency_s'])} Balanced integration score "
-                f"(BIS): {caveats['balanced_integration']}",
-                caveats["ez"],
-                *_fitted(trade),
-            ),
-            tables=tuple(table for table in model_tables(trade) if table.rows),
-            appendix=True,
-            folded=True,
-        )
+    for shown in shown_trades(report.statistics):
+        trade = shown.trade
+        if isinstance(trade, SpeedAccuracy):
+            caveats = trade.caveats
+            yield Section(
+                title=_titled(DETAILS, shown),
+                paragraphs=(
+                    f"Inverse efficiency score (IES): {_lower(caveats['inverse_efficiency_s'])} Balanced integration "
+                    f"score (BIS): {caveats['balanced_integration']}",
+                    caveats["ez"],
+                    *_fitted(trade),
+                ),
+                tables=tuple(table for table in _model_tables(shown, trade) if table.rows),
+                appendix=True,
+                folded=True,
+            )
 
 
 def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _used(found: DirectionStatistics, trade: SpeedAccuracy) -> str:
+def _used(shown: ShownTrade, trade: SpeedAccuracy) -> str:
     """How many trials count, and whose they are."""
     used = f"{trade.n:,} of {how_many(trade.answered, 'answered trial')} have a time of the answerer's own hand"
-    synthetic = found.origin.synthetic
-    model = " All times are synthetic: they show the model that made them, and nothing of people." if synthetic else ""
-    return " ".join([f"{used} ({how_many(trade.people, 'participant')}).{model}", *_refused(trade)])
+    model = " All times are synthetic: they show the model that made them, and nothing of people."
+    said = f"{used} ({how_many(trade.people, 'participant')}).{model if shown.synthetic else ''}"
+    return " ".join([said, *_refused(trade)])
 
 
 def _refused(trade: SpeedAccuracy | NoSpeedAccuracy) -> tuple[str, ...]:
@@ -267,38 +276,40 @@ def _fitted(trade: SpeedAccuracy) -> Iterator[str]:
         yield caveats["together"]
 
 
-def trade_pictures(found: DirectionStatistics, trade: SpeedAccuracy) -> tuple[Picture, ...]:
+def trade_pictures(shown: ShownTrade, trade: SpeedAccuracy) -> tuple[Picture, ...]:
     """The two figures, as far as there is something to draw."""
     pictures = []
     panels = "; one panel an instruction" if len(trade.instructions) > 1 else ""
-    if has_curve(found):
+    curve, points = shown.stems
+    if has_curve(trade):
         caption = (
-            f"Conditional accuracy functions of {found.people}{panels}: each one's trials in order of time, cut into "
+            f"Conditional accuracy functions of {shown.people}{panels}: each one's trials in order of time, cut into "
             "five bins, then averaged over participants. A rising line: fast answers are guesses more often."
         )
-        alt = f"Line chart of accuracy over response time. {'; '.join(_curve_words(trade))}."
-        pictures.append(Picture(stem=CONDITIONAL_ACCURACY, caption=caption, alt=alt))
-    if has_points(found):
+        alt = f"Line chart of accuracy over response time. {'; '.join(_curve_words(trade, shown.names))}."
+        pictures.append(Picture(stem=curve, caption=caption, alt=alt))
+    if has_points(trade):
         caption = (
-            f"Quantile-probability plot of {found.people}{panels}: the 10, 30, 50, 70 and 90 % quantiles of the times "
+            f"Quantile-probability plot of {shown.people}{panels}: the 10, 30, 50, 70 and 90 % quantiles of the times "
             "of errors (empty) and correct answers (filled) over how often they are given, averaged over the "
             "participants who gave at least 5 of the kind; lines join equal quantiles."
         )
-        alt = f"Plot of response time quantiles over answer probabilities. {'; '.join(_points_words(trade))}."
-        pictures.append(Picture(stem=QUANTILE_PROBABILITY, caption=caption, alt=alt))
+        told = "; ".join(_points_words(trade, shown.names))
+        alt = f"Plot of response time quantiles over answer probabilities. {told}."
+        pictures.append(Picture(stem=points, caption=caption, alt=alt))
     return tuple(pictures)
 
 
-def _curve_words(trade: SpeedAccuracy) -> Iterator[str]:
-    for name, cell in cells_of(trade):
+def _curve_words(trade: SpeedAccuracy, names: TradeNames) -> Iterator[str]:
+    for name, cell in cells_of(trade, names):
         curve = cell.conditional_accuracy
         if curve.people:
             ends = [f"{apa.percent(curve.accuracy[k])} at {apa.number(curve.mean_time_s[k])} s" for k in (0, -1)]
             yield f"{name} from {ends[0]} to {ends[1]}"
 
 
-def _points_words(trade: SpeedAccuracy) -> Iterator[str]:
-    for name, cell in cells_of(trade):
+def _points_words(trade: SpeedAccuracy, names: TradeNames) -> Iterator[str]:
+    for name, cell in cells_of(trade, names):
         points = cell.quantile_probability
         kinds = zip(("errors", "correct answers"), points.quantiles_s, points.people, strict=True)
         medians = [f"median of {kind} {apa.number(row[2])} s" for kind, row, count in kinds if count]

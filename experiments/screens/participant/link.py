@@ -72,7 +72,7 @@ def clock_map(trips: Iterable[RoundTrip]) -> ClockMap:
 PINGS = 8
 """Pings of one mapping of the clocks; the shortest counts."""
 
-LOOK_S = 0.5
+_BEAT_LOOK_S = 0.5
 """How long one look for a beat takes: should this program stand still itself, that is one look and no more."""
 
 MAX_CLOCK_STEP_S = 0.02
@@ -288,9 +288,9 @@ class ParticipantLink:
 
     def _beat_within(self, within_s: float) -> float:
         """When the beat after the next one is due; 0 if none comes: the screen is ended then, and counts as gone."""
-        for _ in range(math.ceil(within_s / LOOK_S)):
+        for _ in range(math.ceil(within_s / _BEAT_LOOK_S)):
             with suppress(queue.Empty):
-                return self._beats.get(timeout=LOOK_S)
+                return self._beats.get(timeout=_BEAT_LOOK_S)
         self._failed(f"the participant's screen stood still for {within_s:g} s and was ended")
         self._process.kill()
         return 0.0

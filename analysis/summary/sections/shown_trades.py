@@ -1,0 +1,69 @@
+"""Whose speed and accuracy a report tells of, and by which names: of experiment 1 and of designs' questions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from analysis.report.labels import display_name
+from analysis.summary.figures.trade import Trade, TradeNames
+from analysis.summary.results import DesignSummary, StudyStatistics
+from analysis.summary.sections.content import condition_words
+from analysis.times.own_trials import INSTRUCTION
+from device.words import DIRECTIONS, how_many
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShownTrade:
+    """Speed and accuracy of experiment 1, or of a question of a design, with what it takes to tell of them.
+
+    `of`: which question it is, empty of experiment 1; `people`: who, in words; `first`: the answer that the start of
+    the diffusion leans to; `stems`: of the figures of conditional accuracy and quantile probabilities.
+    """
+
+    trade: Trade
+    of: str
+    people: str
+    synthetic: bool
+    first: str
+    names: TradeNames
+    stems: tuple[str, str]
+
+
+def shown_trades(statistics: StudyStatistics, word: Callable[[str], str] = display_name) -> Iterator[ShownTrade]:
+    """All measures of speed and accuracy; `word` makes names of codes."""
+    if (direction := statistics.direction) is not None:
+        yield ShownTrade(
+            trade=direction.speed_accuracy,
+            of="",
+            people=direction.people,
+            synthetic=direction.origin.synthetic,
+            first=DIRECTIONS[0],
+            names=_names(direction.speed_accuracy, {method: word(method) for method in direction.methods}, str),
+            stems=("figure-conditional-accuracy", "figure-quantile-probability"),
+        )
+    for name, design in statistics.designs.items():
+        yield from _of_design(name, design, word)
+
+
+def _of_design(name: str, design: DesignSummary, word: Callable[[str], str]) -> Iterator[ShownTrade]:
+    def instruction(level: str) -> str:
+        return condition_words(design, f"{INSTRUCTION} {level}", word) if INSTRUCTION in design.factors else level
+
+    for asked, question in design.questions.items():
+        if (trade := question.speed_accuracy) is not None:
+            conditions = {key: condition_words(design, key, word) for key in trade.methods}
+            yield ShownTrade(
+                trade=trade,
+                of=f"{design.title or name.capitalize()}, {asked}",
+                people=how_many(design.n, "synthetic participant" if design.origin.synthetic else "participant"),
+                synthetic=design.origin.synthetic,
+                first=next(iter(question.cells[0].answers or ()), "") if question.cells else "",
+                names=_names(trade, conditions, instruction),
+                stems=(f"figure-{name}-{asked}-conditional-accuracy", f"figure-{name}-{asked}-quantile-probability"),
+            )
+
+
+def _names(trade: Trade, conditions: Mapping[str, str], instruction: Callable[[str], str]) -> TradeNames:
+    told = () if trade is None else trade.instructions
+    return TradeNames(conditions=conditions, instructions={one: instruction(one) for one in told})
