@@ -11,6 +11,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from analysis.logs.design_logs import DesignLogs
+from analysis.logs.exclusion_rules import Rules, TrialRules, anticipations, apply_rules
+from analysis.logs.reading import Logs
 from analysis.report.section import Section
 from analysis.summary.design_times import question_times
 from analysis.summary.designs import summarise
@@ -186,3 +189,22 @@ def test_a_report_without_measures_has_no_such_section() -> None:
     found = summarise(config, table.assign(gun="real"))
     report = ReportData(title="T", statistics=StudyStatistics(designs={"test": found}))
     assert [*trade_sections(report), *trade_details(report)] == []
+
+
+def test_answers_sooner_than_anybody_reacts_are_named_and_a_rule_drops_them() -> None:
+    config, table = answered(people=2)
+    table.loc[[0, 1, len(table) - 1], "response_time_s"] = 0.05
+    table.loc[2, ["response_time_s", "response_time_valid"]] = 0.05, 0  # nobody's own
+    empty = pd.DataFrame(columns=["participant_id", "study"])
+    logs = Logs(
+        trials=empty,
+        ratings=empty,
+        problems=(),
+        paths=(),
+        designs=(DesignLogs(design=config, table=table.assign(flags="", study=""), gun_labels={}),),
+    )
+    (said,) = anticipations(logs)
+    assert said.startswith("test: 3 anticipations, answers within 0.1 s of the onset (P0 2, P1 1; response_time_s)")
+    ruled = apply_rules(logs, Rules(trials=TrialRules(response_time_min_s=0.1)))
+    assert ruled.dropped["test"] == {"P0": {"response_time_min_s": 2}, "P1": {"response_time_min_s": 1}}
+    assert [*anticipations(ruled.logs)] == []

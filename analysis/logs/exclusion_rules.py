@@ -43,6 +43,7 @@ from analysis.times.own_trials import timed
 from experiments.config.door import Model, Seconds, Share
 from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR
+from experiments.record.design_table import ANTICIPATION_S
 from experiments.record.tables import TRACK_OVER
 from experiments.tasks.questions import correct_columns
 
@@ -170,6 +171,29 @@ def _ruled_design(logs: DesignLogs) -> _Ruled:
         scored=tuple(correct_columns(questions).values()),
         own_times=own_times,
     )
+
+
+def anticipations(logs: Logs) -> Iterator[str]:
+    """Answers by the participant's own hand that came sooner than anybody reacts, by experiment and column of times."""
+    for one in _ruled(logs):
+        for name, own in one.own_times(one.table).items():
+            hasty = own & (one.table[name].to_numpy(dtype=np.float64, na_value=np.nan) < ANTICIPATION_S)
+            if hasty.any():
+                yield _anticipated(one.experiment, name, one.table["participant_id"][hasty])
+
+
+def _anticipated(experiment: str, column: str, codes: pd.Series) -> str:
+    people = [f"{who} {count}" for who, count in sorted(codes.astype(str).value_counts(sort=False).items())]
+    more = f" and {len(people) - _NAMED} others" if len(people) > _NAMED else ""
+    return (
+        f"{experiment}: {len(codes)} anticipations, answers within {ANTICIPATION_S:g} s of the onset "
+        f"({', '.join(people[:_NAMED])}{more}; {column}); they count, and `response_time_min_s = {ANTICIPATION_S:g}` "
+        "under [trials] in a file for --rules drops them"
+    )
+
+
+_NAMED = 20
+"""So many people are named in a sentence."""
 
 
 def apply_rules(logs: Logs, rules: Rules) -> ExclusionEffect:

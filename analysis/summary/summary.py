@@ -14,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import pandas as pd
 
+from analysis.logs.exclusion_rules import anticipations
 from analysis.logs.exclusions import IN_NO_TEST, LeftOut, complete_rows, shared_methods
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
@@ -54,7 +55,6 @@ from analysis.summary.designs import origin_of, summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.words import DIRECTIONS
-from experiments.record.design_table import ANTICIPATION_S
 
 METHOD_ORDER = ("vibration", "asymmetric-1", "asymmetric-2")
 TUKEY_ERROR_TERM = (
@@ -95,25 +95,8 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
         found = _timed(found, logs, fits=fits)
     tell("fits")
     apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
-    said = (*_hasty(logs.trials), *_repeated(logs.ratings), *_warnings(found))
+    said = (*anticipations(logs), *_repeated(logs.ratings), *_warnings(found))
     return replace(found, warnings=said, versions=statistics_versions(), kept_apart=apart or None)
-
-
-def _hasty(table: pd.DataFrame) -> Iterator[str]:
-    """Answers by the participant's own hand that came sooner than anybody reacts."""
-    soon = table["response_time_s"].to_numpy(dtype=np.float64) < ANTICIPATION_S
-    if not soon.any():
-        return
-    hasty = timed(table).by_own_hand & soon
-    people = table["participant_id"][hasty].astype(str).value_counts(sort=False)
-    if hasty.any():
-        shown = ", ".join(f"{who} {count}" for who, count in sorted(people.items())[:_NAMED])
-        more = f" and {len(people) - _NAMED} others" if len(people) > _NAMED else ""
-        yield (
-            f"direction: {np.count_nonzero(hasty)} anticipations, answers within {ANTICIPATION_S:g} s of the onset "
-            f"({shown}{more}); they count, and `response_time_min_s = {ANTICIPATION_S:g}` under [trials] in a file for "
-            "--rules drops them"
-        )
 
 
 def _repeated(table: pd.DataFrame) -> Iterator[str]:
