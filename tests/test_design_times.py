@@ -19,6 +19,7 @@ from analysis.summary.design_times import question_times
 from analysis.summary.designs import summarise
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.designs import result_sentences
 from analysis.summary.sections.pictures import write_figures
 from analysis.summary.sections.trade import trade_details, trade_sections
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
@@ -120,6 +121,17 @@ def test_the_effect_of_the_instruction_is_paired_by_person() -> None:
     assert (effect.a, effect.b) == ("speed", "accuracy")
     told = effect.mean_s.mean, effect.mean_s.ci_low, effect.mean_s.ci_high
     assert told == pytest.approx(((own["speed"] - own["accuracy"]).mean(), interval.low, interval.high))
+
+
+def test_the_results_say_in_a_sentence_what_haste_gave() -> None:
+    config, table = answered()
+    (said,) = result_sentences("test", shown(config, table).statistics.designs["test"])
+    own = table.groupby(["participant_id", "method", "grip", "instruction"])["response_time_s"].mean()
+    own = own.groupby(["participant_id", "instruction"]).mean().unstack()
+    interval = stats.ttest_rel(own["speed"], own["accuracy"]).confidence_interval()
+    mean = (own["speed"] - own["accuracy"]).mean()
+    told = f"mean time −{-mean:.3f} [−{-interval.low:.3f}, −{-interval.high:.3f}] s, right answers −"
+    assert f"Told “In haste” instead of “accuracy” (paired by participant, n = 5): {told}" in said
 
 
 def test_the_first_answer_is_where_the_start_leans_to() -> None:

@@ -15,6 +15,7 @@ from analysis.summary.results import DesignSummary
 from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData, condition_words, effect_words
 from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
+from analysis.summary.sections.shown_trades import instruction_sentences
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from device.words import how_many
 from experiments.design.language import Level, shown_level
@@ -82,7 +83,7 @@ def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) ->
             few = [TWO_PEOPLE] if found.n == 2 and tests else []
             fitted = [*threshold_sentences(found, question), *pair_sentences(found, question)]
             cells = [] if question.held and fitted else [_cells_words(found, question)]
-            told = " ".join([*cells, *tests, *few, *fitted])
+            told = " ".join([*cells, *tests, *few, *fitted, *instruction_sentences(found, question)])
             yield f"{(found.title or name.capitalize()).rstrip('.?!')}, {asked} ({people}): {told}"
 
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.summary.figures.trade import Trade, TradeNames
+from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary, StudyStatistics
 from analysis.summary.sections.content import condition_words
 from analysis.times.own_trials import INSTRUCTION
+from analysis.times.people import Mean
+from analysis.times.speed_accuracy import SpeedAccuracy
 from device.words import DIRECTIONS, how_many
 
 
@@ -47,21 +51,47 @@ def shown_trades(statistics: StudyStatistics, word: Callable[[str], str] = displ
 
 
 def _of_design(name: str, design: DesignSummary, word: Callable[[str], str]) -> Iterator[ShownTrade]:
-    def instruction(level: str) -> str:
-        return condition_words(design, f"{INSTRUCTION} {level}", word) if INSTRUCTION in design.factors else level
-
     for asked, question in design.questions.items():
         if (trade := question.speed_accuracy) is not None:
-            conditions = {key: condition_words(design, key, word) for key in trade.methods}
             yield ShownTrade(
                 trade=trade,
                 of=f"{design.title or name.capitalize()}, {asked}",
                 people=how_many(design.n, "synthetic participant" if design.origin.synthetic else "participant"),
                 synthetic=design.origin.synthetic,
                 first=next(iter(question.cells[0].answers or ()), "") if question.cells else "",
-                names=_names(trade, conditions, instruction),
+                names=_names_of_design(design, trade, word),
                 stems=(f"figure-{name}-{asked}-conditional-accuracy", f"figure-{name}-{asked}-quantile-probability"),
             )
+
+
+def _names_of_design(design: DesignSummary, trade: Trade, word: Callable[[str], str]) -> TradeNames:
+    def instruction(level: str) -> str:
+        return condition_words(design, f"{INSTRUCTION} {level}", word) if INSTRUCTION in design.factors else level
+
+    conditions = () if trade is None else trade.methods
+    return _names(trade, {one: condition_words(design, one, word) for one in conditions}, instruction)
+
+
+def instruction_sentences(design: DesignSummary, question: QuestionSummary) -> Iterator[str]:
+    """What each instruction gave in time and accuracy beside another, in the mean over conditions."""
+    trade = question.speed_accuracy
+    effects = trade.instruction_effects if isinstance(trade, SpeedAccuracy) else ()
+    names = _names_of_design(design, trade, display_name).instructions
+    over = {None} if any(one.method is None for one in effects) else {one.method for one in effects}
+    for one in effects:
+        if one.method in over and one.mean_s.people > 1:
+            whose = f"paired by participant, n = {one.mean_s.people:,}"
+            time, right = _more(one.mean_s, 1.0, 3), _more(one.accuracy, 100.0, 1)
+            yield (
+                f"Told “{names[one.a]}” instead of “{names[one.b]}” ({whose}): mean time {time} s, right answers "
+                f"{right} percentage points (95 % intervals)."
+            )
+
+
+def _more(one: Mean, scale: float, digits: int) -> str:
+    mean, low, high = (None if value is None else scale * value for value in (one.mean, one.ci_low, one.ci_high))
+    sign = "+" if mean is not None and mean > 0.0 else ""
+    return f"{sign}{apa.number(mean, digits)} {apa.interval(low, high, digits)}"
 
 
 def _names(trade: Trade, conditions: Mapping[str, str], instruction: Callable[[str], str]) -> TradeNames:
