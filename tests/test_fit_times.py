@@ -177,6 +177,14 @@ def test_no_log_at_all_is_said(tmp_path: Path, recoil: Recoil) -> None:
     assert "no usable log of experiment 1" in done.stderr
 
 
+@pytest.mark.slow
+def test_of_another_design_it_is_said_who_fits_it(tmp_path: Path, recoil: Recoil) -> None:
+    recoil("run", "hurry", "--participant", "S1", "--screen", "synthetic", "--seed", "1", "--results", "logs")
+    done = recoil("fit", "times", "logs", "--out", "out")
+    assert done.returncode == 2
+    assert "of other designs (hurry) `recoil analyze --fits` fits the model" in done.stderr
+
+
 @pytest.mark.parametrize("text", ["some", "3-0.2", "1", "1..2-3"])
 def test_lapses_that_are_no_range_are_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="--lapses"):

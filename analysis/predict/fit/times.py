@@ -136,7 +136,9 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     where = ", ".join(map(str, paths))
     if not len(logs.trials):
         reasons = [str(one) for one in (*logs.problems, *logs.begun)]
-        raise PlaceError("\n".join([f"no usable log of experiment 1 in {where}", *reasons]))
+        others = ", ".join(one.design.design for one in logs.designs)
+        instead = f"; of other designs ({others}) `recoil analyze --fits` fits the model" if others else ""
+        raise PlaceError("\n".join([f"no usable log of experiment 1 in {where}{instead}", *reasons]))
     names = logs.methods.and_then(MethodNames(order=METHOD_ORDER))
     methods = names.ordered(map(str, logs.trials["method"].cat.categories))
     own = own_trials(logs.trials, methods)
