@@ -16,6 +16,13 @@ from device.words import Direction
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
 from experiments.config.findings import DESIGN_NAME, LANGUAGE_CODE
 from experiments.config.lines import LineText
+from experiments.design.around_trials import (
+    BreaksConfig,
+    FatigueConfig,
+    OpeningConfig,
+    PracticeConfig,
+    TimingConfig,
+)
 from experiments.design.language import (
     DIRECTION_FACTOR,
     DRIVEN,
@@ -24,15 +31,10 @@ from experiments.design.language import (
     INTERVAL_NAMES,
     METHOD_FACTOR,
     TRAIN_INTERVAL,
-    BreaksConfig,
     ColumnName,
     FactorConfig,
-    FatigueConfig,
-    OpeningConfig,
     OrderConfig,
-    PracticeConfig,
     QuestionConfig,
-    TimingConfig,
     TrialConfig,
     shown_level,
 )
