@@ -206,9 +206,9 @@ def check_pace(screen: str, gun: str) -> None:
 
 
 def _at_terminal(request: RunRequest) -> Finished:
-    def screen(_: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
+    def screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
         messages = request.language.messages
-        return TerminalScreen(plan, clock, messages=messages)
+        return TerminalScreen(plan, clock, messages=messages, design=setup.config)
 
     return run(request, screen, RealClock())
 

@@ -18,11 +18,14 @@ from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.run import run
 from experiments.run_request import RunRequest
+from experiments.screens.practice_text import practice_text
 from experiments.screens.synthetic import synthetic_screen
+from experiments.session.practice_rounds import is_needed, scores
+from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import FireShot, Inform, Prepare, Rest
 from experiments.study.folders import place
 from recoil.config_files import copy_began_with
-from tests.designs import SHIPPED, changed
+from tests.designs import SHIPPED, changed, laws_of
 
 SETUPS = {name: load_setup(name) for name in SHIPPED}
 SETUPS["preference"] = changed("preference", laws={"questions": {"comment": {"texts": ("soft",)}}})
@@ -166,6 +169,81 @@ def test_a_practice_has_some_of_each_cell_and_is_kept_apart(tmp_path):
     plan = practice_of(design, "P01", 1)
     assert plan.practice
     assert sorted(trial.method for trial in plan.trials) == sorted([*design.methods] * 2)
+
+
+def in_rounds(share, until_right=0.8, rounds=3):
+    """Experiment 1 whose people are right so often, with a practice in rounds of six trials."""
+    rates = dict.fromkeys(laws_of(SETUPS["direction"]).questions["response"].share, share)
+    people = {"questions": {"response": {"share": rates, "ability_sd": 0.0}}}
+    practice = {"repetitions": 1, "of": ("method", "direction"), "until_right": until_right, "rounds": rounds}
+    return changed("direction", laws=people, practice=practice)
+
+
+def practised(setup, results, screen=synthetic_screen):
+    request = RunRequest(setup=setup, participant_id="P01", results=results, seed=1, practice=True)
+    return run(request, screen, VirtualClock())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "rounds", "reached"), [(1 - 1e-9, 1, True), (1e-9, 3, False)])
+def test_a_practice_in_rounds_is_over_once_enough_of_one_are_right(share, rounds, reached, tmp_path):
+    setup = in_rounds(share)
+    finished = practised(setup, tmp_path)
+    told = history(read_journal(finished.place.journal))
+    felt = [step.trial.set for step, _ in told if isinstance(step, FireShot)]
+    assert Counter(felt) == dict.fromkeys(range(1, rounds + 1), 6)
+    last = scores(setup.config, finished.plan, told)[-1]
+    assert (last.trials, last.reaches(0.8)) == (6, reached)
+    assert ("That was not reached" in practice_text(setup.config, finished.plan, told)) is not reached
+    assert finished.plan.may_end_early
+    rows = rows_of(finished.place.table.read_bytes())
+    assert [row["set"] for row in rows if row["response"]] == [str(one) for one in felt]
+    assert rebuild(finished.place.journal)[1] == finished.place.table.read_bytes()
+
+
+@pytest.mark.slow
+def test_a_rounds_answers_count_as_they_were_corrected(tmp_path):
+    setup = in_rounds(1e-9, rounds=2)
+    finished = practised(setup, tmp_path)
+    told = [*history(read_journal(finished.place.journal))]
+    first = [trial for trial in finished.plan.trials if trial.set == 1]
+    assert is_needed(setup.config, finished.plan, told, 2)
+    told += [(None, EntryCorrected(trial=one, question="response", value=one.direction)) for one in first[:4]]
+    assert is_needed(setup.config, finished.plan, told, 2)  # 4 of 6 are not 80 %
+    told += [(None, EntryCorrected(trial=first[4], question="response", value=first[4].direction))]
+    assert not is_needed(setup.config, finished.plan, told, 2)
+
+
+def test_each_round_has_the_same_trials_in_an_order_of_its_own_and_the_first_is_as_without_rounds():
+    plan = practice_of(in_rounds(0.5).config, "P01", 1)
+    rounds = [[trial.levels for trial in plan.trials if trial.set == number] for number in (1, 2, 3)]
+    assert sorted(rounds[0]) == sorted(rounds[1]) == sorted(rounds[2])
+    assert rounds[0] != rounds[1]
+    once = changed("direction", practice={"repetitions": 1, "of": ("method", "direction")}).config
+    assert [trial.levels for trial in practice_of(once, "P01", 1).trials] == rounds[0]
+    assert not practice_of(once, "P01", 1).may_end_early
+
+
+@pytest.mark.parametrize(
+    ("practice", "said"),
+    [
+        ({"until_right": 0.8}, "until_right needs rounds"),
+        ({"rounds": 3}, "rounds needs until_right"),
+        ({"until_right": 0.8, "rounds": 3, "repetitions": 0, "of": ()}, "a practice needs repetitions"),
+    ],
+)
+def test_a_criterion_and_rounds_go_together(practice, said):
+    whole = {"repetitions": 1, "of": ("method",)} | practice
+    with pytest.raises(ValueError, match=said):
+        changed("direction", practice=whole)
+
+
+def test_a_criterion_needs_something_that_is_right_in_the_trial():
+    practice = {"repetitions": 1, "of": ("method",), "until_right": 0.8, "rounds": 3}
+    with pytest.raises(ValueError, match=r"practice\.until_right = 0\.8: nothing is right or wrong"):
+        changed("preference", practice=practice)
+    with pytest.raises(ValueError, match="is asked after the block; ask it in the trial"):
+        changed("direction", practice=practice, questions={"response": {"when": "block"}})
 
 
 @pytest.mark.slow

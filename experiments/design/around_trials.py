@@ -19,17 +19,29 @@ class OpeningConfig(Model):
 
 
 class PracticeConfig(Model):
-    """Trials before the first session, in files of their own, never analysed: so many of each cell of `of`."""
+    """Trials before the first session, in files of their own, never analysed: so many of each cell of `of`.
+
+    They come in a round, and again in another order `until_right`: that share of a round's answers was right, in so
+    many `rounds` at the most.
+    """
 
     repetitions: Annotated[int, Field(ge=0, le=100)] = 0
     of: Annotated[tuple[ColumnName, ...], AfterValidator(once)] = ()
     feedback: bool = False
+    until_right: Annotated[float, Field(gt=0, le=1)] | None = None
+    rounds: Annotated[int, Field(ge=1, le=20)] = 1
 
     @model_validator(mode="after")
     def _of_something(self) -> Self:
         if bool(self.repetitions) != bool(self.of):
             missing = "of: the factors whose cells are practised" if self.repetitions else "repetitions: how often"
             raise ValueError(f"a practice needs {missing}")
+        if self.until_right is not None and self.rounds == 1:
+            raise ValueError("until_right needs rounds: how many there are at the most, such as 4")
+        if self.until_right is None and self.rounds > 1:
+            raise ValueError("rounds needs until_right: the share of right answers that ends them, such as 0.8")
+        if self.rounds > 1 and not self.repetitions:
+            raise ValueError("a practice needs repetitions: how often, and of: the factors whose cells are practised")
         return self
 
 

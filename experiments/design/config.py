@@ -387,6 +387,18 @@ def _feedback_problems(design: DesignConfig) -> Iterator[str]:
     for key, asked in told.items():
         if asked and not scored:
             yield f"{key} = true: nothing is right or wrong; give a question `correct`, or remove {key}"
+    yield from _criterion_problems(design)
+
+
+def _criterion_problems(design: DesignConfig) -> Iterator[str]:
+    if design.practice.until_right is None:
+        return
+    key = f"practice.until_right = {design.practice.until_right:g}"
+    first = next((one for one in design.questions.values() if one.correct), None)
+    if first is None:
+        yield f"{key}: nothing is right or wrong; give a question `correct`, or remove until_right and rounds"
+    elif first.when != "trial":
+        yield f"{key}: the first question with a right answer is asked after the block; ask it in the trial"
 
 
 def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:

@@ -207,8 +207,16 @@ def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
     yield "Participants were told whether they were right." if trial.feedback else "There was no feedback."
     if design.practice.repetitions:
         each = joined_by_and([factor_words(name) for name in design.practice.of])
-        told = ", with feedback" if design.practice.feedback else ""
-        yield f"{design.practice.repetitions} of each {each} could be practised first{told}; that was not analysed."
+        how = (", with feedback" if design.practice.feedback else "") + _rounds(design)
+        yield f"{design.practice.repetitions} of each {each} could be practised first{how}; that was not analysed."
+
+
+def _rounds(design: DesignConfig) -> str:
+    practice = design.practice
+    if practice.until_right is None:
+        return ""
+    share = f"{100.0 * practice.until_right:g} %"
+    return f", in at most {practice.rounds} rounds, until {share} of a round's answers were right"
 
 
 def _one_interval(design: DesignConfig) -> str:

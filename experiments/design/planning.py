@@ -82,9 +82,10 @@ def _with_own_tracks(trials: Sequence[Trial]) -> Iterator[Trial]:
 
 
 def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: int = 0) -> Plan:
-    """The plan of a practice: some trials of each cell of `practice.of`, mixed, in one set; a design may have none.
+    """The plan of a practice: some trials of each cell of `practice.of`, mixed; a design may have none.
 
-    The levels of the other factors are drawn. A practice is of the gun: it has no instruction.
+    The levels of the other factors are drawn. A practice is of the gun: it has no instruction. Each round that there
+    may be is a set.
     """
     practice, given = design.practice, _chosen("group", groups(design), group)
     streams = Streams(seed, (design.design, participant_id, "practice"))
@@ -93,13 +94,13 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
         cell = tuple(pair for pair in content.levels if pair[0] in practice.of)
         alike.setdefault(cell, []).append(content)
     drawn = [
-        one
-        for at, cell in enumerate(alike)
-        for one in _some(alike[cell], practice.repetitions, streams.of("practice-cell", str(at)))
+        (number, content)
+        for number in range(1, practice.rounds + 1)
+        for content in _round(list(alike.values()), practice.repetitions, streams, number)
     ]
     trials = [
-        _trial(design, (1, 1, place), _without(INSTRUCTION_FACTOR, content.levels), content)
-        for place, content in enumerate(streams.of("practice").shuffled(drawn), start=1)
+        _trial(design, (1, number, place), _without(INSTRUCTION_FACTOR, content.levels), content)
+        for place, (number, content) in enumerate(drawn, start=1)
     ]
     return Plan(
         experiment=design.design,
@@ -109,7 +110,19 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
         group=group,
         trials=tuple(trials),
         practice=True,
+        may_end_early=practice.until_right is not None,
     )
+
+
+def _round(cells: Sequence[Sequence[Content]], count: int, streams: Streams, number: int) -> list[Content]:
+    """So many trials of each cell, mixed: of each round by streams of its own, of the first as if there were one."""
+    own = () if number == 1 else (str(number),)
+    drawn = [
+        content
+        for at, alike in enumerate(cells)
+        for content in _some(alike, count, streams.of("practice-cell", str(at), *own))
+    ]
+    return streams.of("practice", *own).shuffled(drawn)
 
 
 def _without(name: str, levels: Condition) -> Condition:

@@ -19,6 +19,7 @@ from experiments.clock import Clock
 from experiments.live_run import LiveRun
 from experiments.record.tables import is_simulated
 from experiments.screens import texts
+from experiments.screens.practice_text import practice_text
 from experiments.session import events
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
@@ -27,6 +28,7 @@ from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step
 
 if TYPE_CHECKING:
+    from experiments.design.config import DesignConfig
     from experiments.design.plan import Plan
 
 _HELP = """At any time: `!` and Enter is the emergency stop, `stop` and a reason stops. `pause`, `undo`, `repeat` and
@@ -57,8 +59,9 @@ class TerminalScreen:
         out: TextIO | None = None,
         *,
         messages: ParticipantMessages = ENGLISH_MESSAGES,
+        design: DesignConfig | None = None,
     ) -> None:
-        self._plan, self._clock, self._messages = plan, clock, messages
+        self._plan, self._clock, self._messages, self._design = plan, clock, messages, design
         self._out = out or sys.stdout
         if isinstance(sys.stdin, io.TextIOWrapper):
             sys.stdin.reconfigure(errors="replace")  # a byte that is no UTF-8 is not to end the run
@@ -141,7 +144,7 @@ class TerminalScreen:
             case State.RESTING:
                 return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n{' ' * _COUNTED}"
             case State.CLOSING:
-                return _CLOSING
+                return f"{self._practised()}{_CLOSING}"
             case State.PAUSED:
                 why = f" {position.why}." if position.why else ""
                 return f"\n  Paused.{why} Type `go on` and Enter: "
@@ -151,6 +154,11 @@ class TerminalScreen:
                 return _HALTED
             case _:
                 return ""
+
+    def _practised(self) -> str:
+        told = self._live.history if self._live else ()
+        said = practice_text(self._design, self._plan, told) if self._design is not None else ""
+        return f"\n{said}" if said else ""
 
     def _head(self, step: Prepare) -> str:
         told = self._live.history if self._live else ()

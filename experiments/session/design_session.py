@@ -12,6 +12,7 @@ from experiments.design.language import INSTRUCTION_FACTOR, TRAIN_INTERVAL, Ques
 from experiments.design.plan import Plan, Trial
 from experiments.design.stimuli import settings
 from experiments.session.history import History, entered_value, of_one_set
+from experiments.session.practice_rounds import is_needed
 from experiments.session.steps import (
     Answered,
     Ask,
@@ -107,7 +108,12 @@ class _Script:
         self._of_track = _by_track(plan)
 
     def due(self, trial: Trial) -> Trial | None:
-        """The trial that a place of the plan is for: of a track the next one in the set; `None` if that is over."""
+        """The trial that a place of the plan is for: of a track the next one in the set; `None` if that is over.
+
+        `None`, too, of a practice's round that is not needed.
+        """
+        if self.plan.practice and not is_needed(self.design, self.plan, self._told, trial.set):
+            return None
         if self._tracks is None or not trial.track:
             return trial
         if self._tracks.is_over(trial.track):

@@ -10,6 +10,7 @@ from experiments.screens import texts
 from experiments.screens.console.keys import is_on_buttons
 from experiments.screens.console.view import About, Ended, Seen, method_text
 from experiments.screens.phrases import isolated, phrase
+from experiments.screens.practice_text import practice_text
 from experiments.session.history import entered_value
 from experiments.session.states import State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Prepare, Present, Rate, Rest, what
@@ -271,6 +272,14 @@ def _since_halt(seen: Seen) -> str:
     return phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
 
 
+def _closing(seen: Seen) -> Instruction:
+    about = seen.about
+    practised = practice_text(about.setup.config, about.plan, seen.told)
+    asked = phrase("Is there anything to correct, to note or to flag? Enter ends the run.")
+    detail = "\n".join(filter(None, [practised, asked]))
+    return Instruction(title=phrase("Everything is answered"), detail=detail, mood="good")
+
+
 _OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
     State.REARMING: Instruction(
         title=phrase("There was an emergency stop.\nStand clear."),
@@ -288,11 +297,7 @@ _OF_STATE: dict[State, Instruction | Callable[[Seen], Instruction]] = {
     State.DESCRIBING: _rating,
     State.INFORMING: _telling,
     State.RESTING: _resting,
-    State.CLOSING: Instruction(
-        title=phrase("Everything is answered"),
-        detail=phrase("Is there anything to correct, to note or to flag? Enter ends the run."),
-        mood="good",
-    ),
+    State.CLOSING: _closing,
     State.PAUSED: _paused,
     State.CORRECTING: _correcting,
     State.HALTED: _halted,

@@ -1,0 +1,27 @@
+"""How a practice in rounds went, in words. Of a run nothing of the kind is told: who sees it may hint at it."""
+
+from __future__ import annotations
+
+from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan
+from experiments.screens.phrases import phrase
+from experiments.session.history import History
+from experiments.session.practice_rounds import scores
+
+
+def practice_text(design: DesignConfig, plan: Plan, told: History) -> str:
+    """The score of the last round, and what was wanted; empty of a run, or of a practice without a criterion."""
+    wanted, rounds = design.practice.until_right, scores(design, plan, told)
+    if wanted is None or not rounds:
+        return ""
+    last = rounds[-1]
+    said = phrase(
+        "Round {number}: {right} of {trials} right; wanted: {share} %.",
+        number=len(rounds),
+        right=last.right,
+        trials=last.trials,
+        share=f"{100.0 * wanted:g}",
+    )
+    if last.reaches(wanted):
+        return said
+    return phrase("{said} That was not reached: explain the task again, then practise anew.", said=said)
