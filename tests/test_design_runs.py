@@ -194,7 +194,7 @@ def test_a_practice_in_rounds_is_over_once_enough_of_one_are_right(share, rounds
     assert Counter(felt) == dict.fromkeys(range(1, rounds + 1), 6)
     last = scores(setup.config, finished.plan, told)[-1]
     assert (last.trials, last.reaches(0.8)) == (6, reached)
-    assert ("That was not reached" in practice_text(setup.config, finished.plan, told)) is not reached
+    assert ("That was not reached" in practice_text(setup.config, finished.plan, told, over=True)) is not reached
     assert finished.plan.may_end_early
     rows = rows_of(finished.place.table.read_bytes())
     assert [row["set"] for row in rows if row["response"]] == [str(one) for one in felt]

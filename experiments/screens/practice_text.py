@@ -9,8 +9,11 @@ from experiments.session.history import History
 from experiments.session.practice_rounds import scores
 
 
-def practice_text(design: DesignConfig, plan: Plan, told: History) -> str:
-    """The score of the last round, and what was wanted; empty of a run, or of a practice without a criterion."""
+def practice_text(design: DesignConfig, plan: Plan, told: History, *, over: bool) -> str:
+    """The score of the last round, and what was wanted; empty of a run, or of a practice without a criterion.
+
+    `over`: no round follows, whether it was reached or not.
+    """
     wanted, rounds = design.practice.until_right, scores(design, plan, told)
     if wanted is None or not rounds:
         return ""
@@ -22,6 +25,6 @@ def practice_text(design: DesignConfig, plan: Plan, told: History) -> str:
         trials=last.trials,
         share=f"{100.0 * wanted:g}",
     )
-    if last.reaches(wanted):
+    if not over or last.reaches(wanted):
         return said
     return phrase("{said} That was not reached: explain the task again, then practise anew.", said=said)

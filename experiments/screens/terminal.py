@@ -142,9 +142,10 @@ class TerminalScreen:
             case State.DESCRIBING if isinstance(step, Describe):
                 return f"\n  {texts.about_text(self._plan, step, self._messages)}. {step.text} "
             case State.RESTING:
-                return f"\nBreak {_between(position)}. (`skip` and a reason ends it early.)\n{' ' * _COUNTED}"
+                said = f"{self._practised(over=False)}\nBreak {_between(position)}."
+                return f"{said} (`skip` and a reason ends it early.)\n{' ' * _COUNTED}"
             case State.CLOSING:
-                return f"{self._practised()}{_CLOSING}"
+                return f"{self._practised(over=True)}{_CLOSING}"
             case State.PAUSED:
                 why = f" {position.why}." if position.why else ""
                 return f"\n  Paused.{why} Type `go on` and Enter: "
@@ -155,9 +156,9 @@ class TerminalScreen:
             case _:
                 return ""
 
-    def _practised(self) -> str:
+    def _practised(self, *, over: bool) -> str:
         told = self._live.history if self._live else ()
-        said = practice_text(self._design, self._plan, told) if self._design is not None else ""
+        said = practice_text(self._design, self._plan, told, over=over) if self._design is not None else ""
         return f"\n{said}" if said else ""
 
     def _head(self, step: Prepare) -> str:

@@ -200,11 +200,16 @@ def _resting(seen: Seen) -> Instruction:
     until_s, step = seen.position.until_s, seen.position.step
     left_s = 0 if until_s is None else max(0, round(until_s - seen.now_s))
     between = step.between if isinstance(step, Rest) else ""
+    told = phrase("Between {between}. It ends by itself with a tone.", between=between)
     return Instruction(
         title=phrase("Break: {duration}", duration=texts.duration_text(left_s)),
-        detail=phrase("Between {between}. It ends by itself with a tone.", between=between),
+        detail="\n".join(filter(None, [_practised(seen, over=False), told])),
         mood="rest",
     )
+
+
+def _practised(seen: Seen, *, over: bool) -> str:
+    return practice_text(seen.about.setup.config, seen.about.plan, seen.told, over=over)
 
 
 def _paused(seen: Seen) -> Instruction:
@@ -273,10 +278,8 @@ def _since_halt(seen: Seen) -> str:
 
 
 def _closing(seen: Seen) -> Instruction:
-    about = seen.about
-    practised = practice_text(about.setup.config, about.plan, seen.told)
     asked = phrase("Is there anything to correct, to note or to flag? Enter ends the run.")
-    detail = "\n".join(filter(None, [practised, asked]))
+    detail = "\n".join(filter(None, [_practised(seen, over=True), asked]))
     return Instruction(title=phrase("Everything is answered"), detail=detail, mood="good")
 
 
