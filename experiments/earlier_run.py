@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
-from device import Gun
+from device import Gun, Identity
 from experiments.catalogues.catalogue import ENGLISH, Language, language
 from experiments.clock import Clock, date_text
 from experiments.config.door import ConfigError
@@ -172,6 +173,30 @@ def _check_same_kind_of_gun(before: Contents, request: RunRequest, gun: Gun) -> 
             f"{before.path}: the run began on {began.name}, and --gun {request.gun} is {gun.identify().name}: one of "
             "them is simulated, where nothing is felt; resume with the --gun it began with, or start anew (--fresh)"
         )
+
+
+UNMEASURED = (
+    "A sensor measured this run until now, and none is named any more: from here on shots are not measured. If they "
+    "are to be, stop, and resume with --sensor."
+)
+
+
+def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iterator[str]:
+    """What is not as it was until a run broke off, and does not forbid to go on: it is said, and noted in the run."""
+    if before is None:
+        return
+    if not request.sensor and any(record.kind == "measured" for record in before.records):
+        yield UNMEASURED
+    was, now = next(filter(None, (record.gun for record in reversed(before.records))), None), gun.identify()
+    if was is not None and was != now:
+        yield (
+            f"The gun was {_who(was)} until now, and is {_who(now)} from here on. If it is to be the same one, stop, "
+            "and resume with the --gun it had."
+        )
+
+
+def _who(gun: Identity) -> str:
+    return f"{gun.name}, version {gun.version}"
 
 
 def words_shown(request: RunRequest) -> tuple[dict[str, str], dict[str, str]] | None:

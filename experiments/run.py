@@ -18,7 +18,7 @@ from experiments.design.planning import plan_of, practice_of
 from experiments.design.shown_texts import setup_in
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import generator
-from experiments.earlier_run import EarlierRun, earlier_run, give_way, resumed_plan, words_shown
+from experiments.earlier_run import EarlierRun, earlier_run, give_way, resumed_plan, what_changed, words_shown
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.load import check_limits
 from experiments.rebuild import table
@@ -112,9 +112,9 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             )
             desk = Desk(live=live, stimuli=stimuli)
             screen.begin(live)
-            if not request.sensor and _was_measured(before):
-                screen.trouble(UNMEASURED)
-                live.remark(Noted(trial=None, text=UNMEASURED))
+            for changed in what_changed(before, request, gun):
+                screen.trouble(changed)
+                live.remark(Noted(trial=None, text=changed))
             settle = recorder.settle if recorder else None
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
 
@@ -184,17 +184,6 @@ def _open_sensor(
     again = request.setup.config.trial.repeat_undelivered
     noise = generator(plan.seed, "sensor", plan.participant_id)
     return open_recorder(request.sensor, request.gun, stimuli.methods, clock, again=again, random=noise)
-
-
-UNMEASURED = (
-    "A sensor measured this run until now, and none is named any more: from here on shots are not measured. If they "
-    "are to be, stop, and resume with --sensor."
-)
-
-
-def _was_measured(before: Contents | None) -> bool:
-    """Whether a sensor took part in a run before it broke off."""
-    return before is not None and any(record.kind == "measured" for record in before.records)
 
 
 def _own_turn(place: Place, config: DesignConfig, before: Contents | None) -> AbstractContextManager[None]:

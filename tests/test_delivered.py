@@ -32,11 +32,12 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.delivered import recorder
 from experiments.design.config import DesignConfig
+from experiments.earlier_run import UNMEASURED
 from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
 from experiments.record import storage
 from experiments.record.journal import Contents, ending_of, read_journal
-from experiments.run import UNMEASURED, Finished, run
+from experiments.run import Finished, run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.watch.runs import RunSoFar

@@ -30,6 +30,7 @@ from experiments.study import register
 from experiments.study.folders import PlaceError, place
 from experiments.study.register import RegisterError
 from tests.designs import changed, direction_with
+from tests.gun_plugins import install
 from tests.journals import forged, raw
 from tests.other_trials import turned
 
@@ -487,6 +488,53 @@ def test_a_run_that_began_on_a_gun_is_not_gone_on_with_where_nothing_is_felt(
     with pytest.raises(PlaceError, match=r"began on haptic-gun:77, and --gun simulated is simulated: .*the --gun it"):
         run(request("preference", tmp_path, "resume"), synthetic_screen, VirtualClock())
     assert journal.read_bytes() == before
+
+
+NAMED_GUN = """
+from device import Identity
+from device.simulated import SimulatedGun
+
+class NamedGun(SimulatedGun):
+    def __init__(self, name, methods, clock):
+        super().__init__(methods, clock)
+        self.name = name
+
+    def identify(self):
+        return Identity(model="shaker", version="2", serial=self.name)
+
+open_gun = NamedGun
+"""
+
+
+@pytest.mark.slow
+def test_a_run_that_goes_on_on_another_gun_says_so_and_has_it_on_record(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    install(monkeypatch, tmp_path, NAMED_GUN, name="shaker", module="named_gun")
+    told = list[str]()
+
+    def sit(gun: str, again: Again, records: int) -> Path:
+        def screen(*given: Any) -> Any:
+            made = synthetic_screen(*given)
+            made.trouble = told.append  # type: ignore[method-assign]
+            return made
+
+        asked = replace(request("direction", tmp_path / "results", again), gun=f"shaker:{gun}")
+        journal = run(asked, screen, VirtualClock()).place.journal
+        journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:records]))
+        return journal
+
+    sit("left", "ask", 8)
+    sit("left", "resume", 16)
+    assert told == []
+    sit("right", "resume", 24)
+    sit("right", "resume", 32)
+    journal = sit("left", "resume", 40)
+    names = ["shaker:left, version 2", "shaker:right, version 2"]
+    assert [one.partition(" from here on")[0] for one in told] == [
+        f"The gun was {was} until now, and is {now}" for was, now in (names, names[::-1])
+    ]
+    assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == told
 
 
 @pytest.mark.parametrize("again", ["ask", "resume", "fresh"])

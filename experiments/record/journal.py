@@ -53,8 +53,8 @@ class Record:
     """A line of a journal after its first: when it was written, and what it holds.
 
     `body` is a step, outcome, shot, remark or a sensor's word as JSON, which their own types read. `shown_s` of an
-    outcome is when the console had painted its step, `reason` of a stop is why, `clock` of a resumption is which; else
-    they are empty.
+    outcome is when the console had painted its step, `reason` of a stop is why, `clock` and `gun` of a beginning or a
+    resumption are which; else they are empty.
     """
 
     n: int
@@ -66,6 +66,7 @@ class Record:
     shown_s: float | None = None
     reason: str = ""
     clock: str = ""
+    gun: Identity | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +99,6 @@ class Head(Record):
     setup_sha256: str
     laws_json: object = None
     participant: ParticipantKind = "person"
-    gun: Identity | None = None
     preregistration_sha256: str = ""
     language: ShownLanguage | None = None
     provenance: dict[str, str] = field(default_factory=dict)
