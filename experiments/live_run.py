@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import NoReturn, Protocol
@@ -162,12 +163,12 @@ class LiveRun:
             if not refusal:
                 self._take(meant, moment)
             before, position = moment.position, self._position
-            kept: list[Remark | None] = [refused(meant, before, refusal)] if refusal else []
+            found: list[Remark | None] = [refused(meant, before, refusal)] if refusal else []
             if not refusal:
-                kept += [remark_of(meant, before, position, self.moment.trial), judging.exchanged(moment, meant)]
-            written = [(remark, self._submit(remark)) for remark in kept if remark is not None]
-        for remark, future in written:  # outside: who shows it may wait for this lock
-            self._watch(remark, future)
+                found += [remark_of(meant, before, position, self.moment.trial), judging.exchanged(moment, meant)]
+            kept = [remark for remark in found if remark is not None]
+            written = self._submit(kept) if kept else None
+        self._watch(kept, written)  # outside: who shows it may wait for this lock
         if not refusal:
             self._screen.show(position)
         return EventVerdict(taken=not refusal, text=refusal or text)
@@ -320,29 +321,32 @@ class LiveRun:
     def remark(self, remark: Remark) -> None:
         """Have a remark written behind what was written before, and shown when it is on the disk."""
         with self.news:
-            written = self._submit(remark)
-        self._watch(remark, written)
+            written = self._submit([remark])
+        self._watch([remark], written)
 
-    def _submit(self, remark: Remark) -> Future[None] | None:
-        """Have a remark written; `None` if the journal is closed, as the run has just ended."""
+    def _submit(self, kept: Sequence[Remark]) -> Future[None] | None:
+        """Have remarks of a kind written, all or none; `None` if the journal is closed, as the run has just ended."""
         try:
-            written = self.journal.submit(remark_kind(remark), body=remark_record(remark))
+            bodies = [{"body": remark_record(remark)} for remark in kept]
+            written = self.journal.submit_together(remark_kind(kept[0]), bodies)
         except RuntimeError:
             return None
-        self._told.append((None, remark))
-        self._history.append((None, remark))
+        for remark in kept:
+            self._told.append((None, remark))
+            self._history.append((None, remark))
         return written
 
     # keeping
 
-    def _watch(self, remark: Remark, written: Future[None] | None) -> None:
+    def _watch(self, kept: Sequence[Remark], written: Future[None] | None) -> None:
         if written is not None:
-            written.add_done_callback(lambda done: self._written(remark, done))
+            written.add_done_callback(lambda done: self._written(kept, done))
 
-    def _written(self, remark: Remark, done: Future[None]) -> None:
-        error = done.exception()
+    def _written(self, kept: Sequence[Remark], done: Future[None]) -> None:
+        error, remark = done.exception(), kept[0]
         if error is None:
-            self._screen.acknowledge(None, remark)
+            for one in kept:
+                self._screen.acknowledge(None, one)
             return
         text = getattr(remark, "text", "")
         gone = isinstance(error, JournalGone)  # it is where the journal is now
@@ -350,17 +354,17 @@ class LiveRun:
         self.halt_unsaved = self.halt_unsaved or halt
         lost = HALT_UNSAVED if halt else f"Not saved: “{text}”" if text else ""
         if not gone:
-            self._take_back(remark)
+            self._take_back(kept)
         self._screen.trouble(f"{error}. {lost}" if lost else str(error))
         if gone:
             self.offer(events.ResultsGone(cause=str(error)))
         elif isinstance(remark, EntryCorrected):  # what comes next may follow from it, and would from nothing on record
             self.offer(events.ResultsGone(cause=CORRECTION_UNSAVED))
 
-    def _take_back(self, remark: Remark) -> None:
+    def _take_back(self, kept: Sequence[Remark]) -> None:
         """Show nothing that the disk refused. The session has read it: a run that goes by it ends."""
         with self.news:
-            self._history = [entry for entry in self._history if entry[1] is not remark]
+            self._history = [entry for entry in self._history if not any(entry[1] is one for one in kept)]
 
     # the run's side
 

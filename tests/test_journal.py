@@ -97,6 +97,30 @@ def test_a_record_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
             assert len(read_journal(tmp_path / "j").records) == count
 
 
+def test_records_that_are_written_together_are_there_together_however_little_room_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = [{"body": "one"}, {"body": "two"}]
+
+    def bodies(room: int) -> list[object]:
+        def short(descriptor: int, data: bytes) -> None:
+            os.write(descriptor, data[:room])
+            if len(data) > room:
+                raise OSError(28, "No space left on device")
+
+        with Journal.create(tmp_path / f"{room}", VirtualClock()) as journal:
+            journal.append("run", **HEAD)
+            with monkeypatch.context() as disk:
+                disk.setattr(storage, "write_all", short)
+                refused = journal.submit_together("remark", together).exception()
+            journal.append("step", body=room)
+        found = [record.body for record in read_journal(tmp_path / f"{room}").records[1:]]
+        assert (refused is None) == ("two" in found)
+        return found
+
+    assert {tuple(bodies(room)[:-1]) for room in range(0, 500, 20)} == {(), ("one", "two")}
+
+
 def test_what_is_read_back_is_all_that_was_written_or_refused(tmp_path: Path) -> None:
     path = tmp_path / "j"
     with Journal.create(path, VirtualClock()) as journal:

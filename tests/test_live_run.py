@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from device import LimitError, LinkError
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
 from experiments.live_run import CORRECTION_UNSAVED, EventVerdict, RunStopped
 from experiments.record import storage
@@ -411,11 +413,14 @@ def ranked(sitting: Sitting, rank: float) -> str:
     return verdict.text
 
 
-def test_ranks_by_the_participants_own_hand_never_tie_nor_do_those_that_are_corrected(tmp_path: Path) -> None:
+def three_ranks() -> Setup[DesignConfig]:
     rank = {"kind": "ranking", "when": "block", "text": "Which place?", "minimum_text": "best"}
     factors = {"method": {"levels": ["vibration", "asymmetric-1", "asymmetric-2"]}}
-    config = design(design="places", factors=factors, questions={"rank": rank})
-    with sat(replace(PREFERENCE, config=config), tmp_path) as sitting:
+    return replace(PREFERENCE, config=design(design="places", factors=factors, questions={"rank": rank}))
+
+
+def test_ranks_by_the_participants_own_hand_never_tie_nor_do_those_that_are_corrected(tmp_path: Path) -> None:
+    with sat(three_ranks(), tmp_path) as sitting:
         sitting.to(S.RATING)
         assert ranked(sitting, 2.0) == ""
         assert "2 was given to another one of this set" in ranked(sitting, 2.0)
@@ -1276,6 +1281,21 @@ def full_for_one_record(disk: pytest.MonkeyPatch) -> None:
     disk.setattr(storage, "sync", full_once)
 
 
+def room_for(disk: pytest.MonkeyPatch, left: int) -> None:
+    """The disk has room for so many bytes; once it was full somebody made room."""
+    whole = storage.write_all
+
+    def while_it_lasts(descriptor: int, data: bytes) -> None:
+        nonlocal left
+        whole(descriptor, data[:left])
+        if len(data) > left:
+            disk.undo()
+            full(descriptor)
+        left -= len(data)
+
+    disk.setattr(storage, "write_all", while_it_lasts)
+
+
 @pytest.mark.parametrize("halted", [False, True])
 def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_from_it(
     halted: bool, tmp_path: Path
@@ -1302,6 +1322,22 @@ def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_
         contents = of_journal(sitting)
     assert [one.value for one in remarks(contents, EntryCorrected)] == ["backward"] * halted
     assert contents.records[-1].reason == (EMERGENCY if halted else CORRECTION_UNSAVED)
+
+
+def test_two_ranks_that_are_exchanged_are_both_written_or_neither(tmp_path: Path) -> None:
+    with sat(three_ranks(), tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
+        sitting.to(S.RATING)
+        for rank in (2.0, 1.0, 3.0):
+            assert ranked(sitting, rank) == ""
+        assert by_hand(sitting, events.Undo())
+        room_for(disk, 500)  # more than one record, and less than both
+        assert by_hand(sitting, events.Correct(value=2.0))
+        wait_for(lambda: sitting.window.troubles, "it is not said")
+        assert ["No space left" in text for text in sitting.window.troubles] == [True]
+        assert not [word for _, word in sitting.live.history if isinstance(word, EntryCorrected)]
+        contents = of_journal(sitting)
+    assert remarks(contents, EntryCorrected) == []
+    assert contents.records[-1].reason == CORRECTION_UNSAVED
 
 
 def test_no_step_follows_from_a_correction_that_cannot_be_written_also_if_the_answer_was_already_taken(

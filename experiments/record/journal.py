@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -197,8 +197,12 @@ class Journal:
 
     def submit(self, kind: Kind, **body: object) -> Future[None]:
         """Have one record written after those submitted before; the result is there when it is on the disk."""
+        return self.submit_together(kind, [body])
+
+    def submit_together(self, kind: Kind, bodies: Iterable[Mapping[str, object]]) -> Future[None]:
+        """Have records written as `submit` does: if one of them is refused, none is there."""
         times = {"monotonic_s": self._clock.now(), "utc": self._clock.utc()}
-        return self._writer.submit(self._write, {"kind": kind, **times, **body})
+        return self._writer.submit(self._write, [{"kind": kind, **times, **body} for body in bodies])
 
     def catch_up(self) -> None:
         """Return when all that was submitted is written, or was refused, of which whoever submitted it is told."""
@@ -215,12 +219,12 @@ class Journal:
             )
         return contents
 
-    def _write(self, record: dict[str, object]) -> None:
+    def _write(self, records: Sequence[dict[str, object]]) -> None:
         if self._gone:  # what stands written again is whole: nothing more goes where nobody finds it
             raise JournalGone(self._gone)
         try:
-            line = record_line({"n": self._count, "link": self._link, "synced_s": self._synced_s, **record})
-            storage.write_all(self._descriptor, line)
+            lines = self._lines(records)
+            storage.write_all(self._descriptor, b"".join(lines))
             if self._each:
                 storage.sync(self._descriptor)
         except (OSError, ValueError) as error:
@@ -231,12 +235,20 @@ class Journal:
                 safe += "; free some space there, then go on with --resume"
             raise JournalError(f"{self.path}: record {self._count} cannot be written ({reason}); {safe}") from error
         self._synced_s = self._clock.now() if self._each else None
-        self._count += 1
-        self._length += len(line)
-        self._link = link_of(line)
+        self._count += len(lines)
+        self._length += sum(map(len, lines))
+        self._link = link_of(lines[-1])
         if not storage.is_at(self._descriptor, self.path):
             self._gone = self._rescue()
             raise JournalGone(self._gone)
+
+    def _lines(self, records: Sequence[dict[str, object]]) -> list[bytes]:
+        """Records that are written together as lines, each of which follows from the one before."""
+        lines, link, synced_s = list[bytes](), self._link, self._synced_s
+        for n, record in enumerate(records, start=self._count):
+            lines.append(record_line({"n": n, "link": link, "synced_s": synced_s, **record}))
+            link, synced_s = link_of(lines[-1]), None
+        return lines
 
     def _rescue(self) -> str:
         """Write a journal again that was deleted, from what is open; where it is now, and what to do."""
@@ -251,7 +263,7 @@ class Journal:
             return f"{what} {lost}. {upto} in it; open the folders above it again, then go on with --resume"
         data = storage.read_open(self._descriptor, self._length)
         for path in (self.path, Path.cwd() / self.path.name, Path.home() / self.path.name):
-            if _written_again(path, data):
+            if storage.written_again(path, data):
                 how = "go on with --resume" if path == self.path else f"put it back as {self.path}, then resume"
                 return f"{what} {lost}. {upto} written again to {path}; {how}"
         return f"{what} {lost}, and cannot be written anywhere else: this run is lost"
@@ -280,23 +292,6 @@ class Journal:
 
 def _nothing_more() -> None:
     """What is written last."""
-
-
-def _written_again(path: Path, data: bytes) -> bool:
-    """Whether a file could be made of this, where none was."""
-    try:
-        storage.make_folder(path.parent)
-        descriptor = storage.create(path)
-    except OSError:
-        return False
-    try:
-        storage.write_all(descriptor, data)
-        storage.sync(descriptor)
-    except OSError:
-        return False
-    finally:
-        os.close(descriptor)
-    return True
 
 
 def hold_journal(path: Path) -> int:

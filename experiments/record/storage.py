@@ -153,6 +153,23 @@ def write_all(descriptor: int, data: bytes) -> None:
         view = view[os.write(descriptor, view) :]
 
 
+def written_again(path: Path, data: bytes) -> bool:
+    """Whether a file could be made of this, where none was."""
+    try:
+        make_folder(path.parent)
+        descriptor = create(path)
+    except OSError:
+        return False
+    try:
+        write_all(descriptor, data)
+        sync(descriptor)
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
 def sync(descriptor: int) -> None:
     """Return when the file's bytes are on the disk."""
     if sys.platform == "darwin":
