@@ -39,6 +39,17 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
         self.where, self.contents = where, contents
 
 
+class NotAsItBegan(PlaceError):  # noqa: N818 - what is there, not what went wrong
+    """An unfinished run that does not go on with what there is now; `refusal` says why, and what it goes on with.
+
+    How to start anew the message says for a command line; a window has a button for it.
+    """
+
+    def __init__(self, before: Contents, refusal: str) -> None:
+        self.refusal = f"{before.path}: {refusal}"
+        super().__init__(f"{self.refusal}, or start anew (--fresh)")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EarlierRun:
     """What stands where a run is to be: a run to go on with, or one that gives way to a new one, for a reason.
@@ -147,16 +158,18 @@ def resumed_plan(before: Contents, request: RunRequest, gun: Gun) -> Plan:
     began, now = before.head.setup_sha256, request.setup.sha256()
     given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
     if began != now:
-        raise PlaceError(
-            f"{before.path}: the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            f"resume with the files it began with, which {given_back} gives back, or start anew (--fresh)"
+        raise NotAsItBegan(
+            before,
+            f"the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
+            f"resume with the files it began with, which {given_back} gives back",
         )
     plan = before.plan
     people = request.setup.laws.model_dump(mode="json") if request.setup.laws is not None else None
     if request.simulated and before.head.laws_json not in (None, people):
-        raise PlaceError(
-            f"{before.path}: the run began with other synthetic people than {request.setup.config.synthetic} has now; "
-            f"resume with those it began with, whom {given_back} gives back, or start anew (--fresh)"
+        raise NotAsItBegan(
+            before,
+            f"the run began with other synthetic people than {request.setup.config.synthetic} has now; "
+            f"resume with those it began with, whom {given_back} gives back",
         )
     _check_same_language(before, request)
     _check_same_kind_of_gun(before, request, gun)
@@ -169,9 +182,10 @@ def _check_same_kind_of_gun(before: Contents, request: RunRequest, gun: Gun) -> 
     """`PlaceError` if a run would be felt in part: it began on a gun and goes on without one, or on one after."""
     began = before.head.gun
     if began is not None and is_simulated(began.name) != is_simulated(gun.identify().name):
-        raise PlaceError(
-            f"{before.path}: the run began on {began.name}, and --gun {request.gun} is {gun.identify().name}: one of "
-            "them is simulated, where nothing is felt; resume with the --gun it began with, or start anew (--fresh)"
+        raise NotAsItBegan(
+            before,
+            f"the run began on {began.name}, and --gun {request.gun} is {gun.identify().name}: one of "
+            "them is simulated, where nothing is felt; resume with the --gun it began with",
         )
 
 
@@ -212,9 +226,10 @@ def _check_same_language(before: Contents, request: RunRequest) -> None:
     if code != now.code:
         raise PlaceError(f"{before.path}: the run began in {code}, not in {now.code}; resume with --language {code}")
     if words_shown(request) != (None if began is None else (began.messages, began.texts)):
-        raise PlaceError(
-            f"{before.path}: the run began with another catalogue {code} than there is now; resume with the one it "
-            "began with (--catalogues DIR), or start anew (--fresh)"
+        raise NotAsItBegan(
+            before,
+            f"the run began with another catalogue {code} than there is now; resume with the one it "
+            "began with (--catalogues DIR)",
         )
 
 

@@ -125,6 +125,21 @@ def test_nothing_is_cut_on_a_small_a_usual_a_large_and_a_scaled_screen(
         wait_for(eye, having("EMERGENCY STOP", "Nothing was fired. The gun reports: disarmed.", "Back"))
 
 
+def test_a_run_that_cannot_go_on_as_it_is_says_what_the_window_offers_in_its_stead(pilot: Path, display: str) -> None:
+    design = pilot / "pilot" / "direction.toml"
+    design.write_text(design.read_text(encoding="utf-8").replace("repetitions = 10", "repetitions = 12"))
+    with started(pilot, display) as (screen, eye):
+        enter(screen)
+        for key, there in (("Return", "The gun is SIMULATED"), ("s", "P01 stopped direction on ")):
+            screen.keys.press(key, "Control_L")
+            wait_for(eye, having(there))
+        screen.keys.press("g", "Control_L")
+        look = wait_for(eye, lambda look: any("began with another config" in text for text in look["texts"]))
+    (refused,) = (text for text in look["texts"] if "began with another config" in text)
+    assert refused.endswith("gives back, or press Start and choose “Set it aside, start anew”.")
+    assert look["cut"] == []
+
+
 def test_type_is_larger_in_a_larger_window() -> None:
     from experiments.screens.console.windows import type_scale
 

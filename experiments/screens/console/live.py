@@ -22,7 +22,7 @@ from experiments.clock import RealClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.shown_texts import setup_in
-from experiments.earlier_run import UnfinishedRun, gone_on_with
+from experiments.earlier_run import NotAsItBegan, UnfinishedRun, gone_on_with
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
@@ -35,7 +35,7 @@ from experiments.screens.console.participant_link import ParticipantSide, check_
 from experiments.screens.console.start import choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
-from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
+from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
@@ -147,6 +147,10 @@ def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
         run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment))
     except RunStopped as stop:
         return _stopped(choice, str(stop))
+    except NotAsItBegan as other:
+        return phrase("{refusal}, or press Start and choose “{set_aside}”.", refusal=other.refusal, set_aside=SET_ASIDE)
+    except UnfinishedRun as left:
+        return phrase("{stopped} Start asks whether to go on there or to start anew.", stopped=_text(left))
     except RecoilError as error:
         return str(error)
     return ""
@@ -230,7 +234,7 @@ class Unfinished(QDialog):
         self.setStyleSheet(start_sheet())
         answers = (
             Option(text=phrase("Go on with it"), key="Ctrl+G", do=lambda _: self._decide("resume", "")),
-            Option(text=phrase("Set it aside, start anew"), key="Ctrl+N", do=self._fresh),
+            Option(text=SET_ASIDE, key="Ctrl+N", do=self._fresh),
             Option(text=phrase("Leave it"), key="Esc", do=lambda _: self.reject()),
         )
         self.question = QuestionBox(_text(found), answers, reason=phrase("to start anew: {why}", why=WHY))

@@ -16,7 +16,7 @@ from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
-from experiments.screens.console.widgets import WHY, Option, QuestionBox, TextLines, start_sheet
+from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.phrases import phrase
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, overview
@@ -247,9 +247,7 @@ class StartWindow(QtWidgets.QWidget):
     def _ask_resume(self, run: RunProgress) -> None:
         answers = (
             Option(text=phrase("Go on with it"), key="Ctrl+G", do=lambda _: self._begin_again("resume", "")),
-            Option(
-                text=phrase("Set it aside, start anew"), key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)
-            ),
+            Option(text=SET_ASIDE, key="Ctrl+N", do=lambda why: self._begin_again("fresh", why)),
             self._leave_it(),
         )
         text = phrase(

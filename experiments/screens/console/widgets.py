@@ -269,6 +269,7 @@ class ReasonLine(LineEdit):
 
 
 WHY = phrase("why? (never a name)")
+SET_ASIDE = phrase("Set it aside, start anew")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
