@@ -70,6 +70,15 @@ def plugged(tmp_path):
     assert not (tmp_path / "port").is_symlink()
 
 
+def test_a_twin_takes_no_link_from_one_that_runs(recoil, tmp_path, plugged):
+    port = tmp_path / "port"
+    before = port.readlink()
+    done = recoil("twin", "--link", port)
+    assert done.returncode == 2
+    assert f"{port}: leads to a twin that still runs; try --tcp PORT, or another --link" in done.stderr
+    assert port.readlink() == before
+
+
 def told(row):
     """A row but for how many shots a train had time for, which on the twin is real time."""
     return {column: cell for column, cell in row.items() if column != "shots"}

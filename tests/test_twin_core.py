@@ -1,5 +1,6 @@
 """The gun's core, as `PROTOCOL.md` says it: by hand, in frames, in its states, and left alone."""
 
+import os
 import socket
 from pathlib import Path
 
@@ -259,6 +260,19 @@ def test_a_file_where_the_link_is_to_be_is_refused_and_kept(tmp_path: Path) -> N
         line.plug()
     line.unplug()
     assert precious.read_bytes() == b"kept"
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
+def test_a_link_that_a_killed_twin_has_left_is_taken_over_whoever_has_its_terminal_now(tmp_path: Path) -> None:
+    gun, other = os.openpty()
+    for left in (os.ttyname(other), "/dev/pts/nobody"):
+        (tmp_path / "gun").symlink_to(left)
+        line = Pty(tmp_path / "gun")
+        line.plug()
+        assert str((tmp_path / "gun").readlink()) not in (left, "")
+        line.unplug()
+    os.close(gun)
+    os.close(other)
 
 
 def test_what_a_host_on_tcp_has_half_said_or_was_to_be_told_is_nothing_to_the_next(tmp_path: Path) -> None:

@@ -41,18 +41,26 @@ class Pty:
         self.address = ""
 
     def plug(self) -> None:
-        """A new pseudo-terminal. `OSError`: something else is where the link is to be, or none can be made here."""
+        """A new pseudo-terminal. `OSError`: something else is where the link is to be, or none can be made here.
+
+        Its host's end is locked for as long as it is there, by which another twin knows that its link is taken.
+        """
         if self._ends is not None:
             return
         if self._link is not None and self._link.exists() and not self._link.is_symlink():
             raise FileExistsError(f"{self._link}: is no link, and would be lost")
         if not hasattr(os, "openpty"):
             raise OSError("this system has no pseudo-terminals")
-        import tty  # noqa: PLC0415 - not on every system
+        import fcntl  # noqa: PLC0415 - not on every system
+        import tty  # noqa: PLC0415
 
+        if self._link is not None and _is_taken(self._link):
+            raise FileExistsError(f"{self._link}: leads to a twin that still runs")
         gun, host = os.openpty()
         tty.setraw(host)
         os.set_blocking(gun, False)
+        with contextlib.suppress(OSError):  # a system that locks no terminals lets a link be taken over
+            fcntl.lockf(host, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._ends, name = (gun, host), os.ttyname(host)
         self.address = str(self._link or name)
         if self._link is not None:
@@ -84,6 +92,29 @@ class Pty:
         if self._ends is not None:
             with contextlib.suppress(OSError):
                 os.write(self._ends[0], data)
+
+
+def _is_taken(link: Path) -> bool:
+    """Whether a link leads to the end of a twin that runs. One that was killed has left it to nobody, or to others."""
+    import fcntl  # noqa: PLC0415 - not on every system
+
+    if not os.path.realpath(link).startswith(_TERMINALS):
+        return False
+    try:
+        end = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.lockf(end, fcntl.LOCK_EX | fcntl.LOCK_NB)  # not `flock`, which whoever opens the port has
+    except OSError:
+        return True
+    finally:
+        os.close(end)
+    return False
+
+
+_TERMINALS = ("/dev/pts/", "/dev/ttys")
+"""Where pseudo-terminals are, on Linux and on macOS: a real port is not opened to look."""
 
 
 class Tcp:
