@@ -143,7 +143,7 @@ class Watcher:
         self._console, self._guns, self._syncs = console, guns, syncs
         self._presses = case == "hangs-emergency"
         self._last_s: float | None = None
-        self.seen: dict[str, Any] = {"longest_ms": 0.0, "ticks_in_fault": 0, "titles": [], "lines": []}
+        self.seen: dict[str, Any] = {"longest_ms": 0.0, "ticks_in_fault": 0, "titles": [], "lines": [], "asking": []}
         self._timer = QTimer()
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
@@ -166,6 +166,8 @@ class Watcher:
         for name, text in (("titles", window.notice.title.text()), ("lines", window.saved.text())):
             if text not in self.seen[name]:
                 self.seen[name].append(text)
+        if window.drawn.state is State.ASKING:
+            self.seen["asking"].append(window.saved.text())
 
     def _act(self, window: Any) -> None:
         from PyQt6.QtCore import Qt

@@ -73,6 +73,8 @@ def test_a_shot_that_fails_is_marked_said_and_presented_again_while_the_window_s
     ]
     assert all(row["response"] for row in rows)
     assert any(cause in line for line in seen["lines"])
+    assert seen["asking"]
+    assert not any(cause in line for line in seen["asking"])  # it is fired anew: the gun answers again
     assert contents.finished
 
 

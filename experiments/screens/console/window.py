@@ -29,7 +29,7 @@ from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.states import Position, State
-from experiments.session.steps import Failed, Rested
+from experiments.session.steps import Failed, Prepared, Rested
 from experiments.session.tracks import Tracks, adaptive_tracks
 
 REFRESH_MS = 100
@@ -75,7 +75,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._progress = RunTiming()
         self._brief_until_s: float | None = None
         self._brief_for = -1
-        self._lasting = ("", "good")
+        self._lasting, self._failure = ("", "good"), ""
         self.theme: Theme = "dark"
         self._scale = 0.0
         self._build()
@@ -190,7 +190,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:
-            self._last(text, "bad" if isinstance(message.word, Failed) else "good")
+            self._failure = text if isinstance(message.word, Failed) else ""
+            self._last(text, "bad" if self._failure else "good")
+        elif self._lasting == (self._failure, "bad") and isinstance(message.word, Prepared):
+            self._last("", "good")  # it is fired anew: of that a failure before says nothing
         if isinstance(message.word, Rested):
             windows.play_tone()
 
