@@ -1,6 +1,7 @@
 """A gun on a line that breaks, babbles or goes silent: each shot once, or said what may be so; disarmed in time."""
 
 import math
+import os
 import re
 import socket
 import struct
@@ -265,6 +266,24 @@ def test_a_gun_that_is_reset_in_mid_shot_cannot_tell_and_the_error_says_so(tmp_p
         pair.gun.arm()
         with pytest.raises(LimitError, match="not home yet"):  # the host remembers what the gun forgot
             pair.gun.fire(a_shot())
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
+@pytest.mark.parametrize("act", ["read", "write", "let go"])
+def test_a_port_that_is_pulled_out_says_what_to_look_at_whatever_is_done_with_it(act):
+    import tty  # not on every system
+
+    gun, host = os.openpty()
+    tty.setraw(host)
+    port = SerialPort(os.ttyname(host))
+    os.close(host)
+    if act == "let go":
+        port.close()
+    os.close(gun)
+    with pytest.raises(Disconnected) as found:
+        port.write(b"x") if act == "write" else port.read()
+    port.close()
+    assert str(found.value) == "the line is gone: look at its plug and at the gun's power"
 
 
 def test_a_reset_is_not_forgotten_when_the_first_greeting_after_it_breaks_off(tmp_path):

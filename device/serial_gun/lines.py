@@ -320,9 +320,10 @@ class SerialPort:
         except self._late:
             raise
         except _BROKEN as error:
-            raise Disconnected(f"the line is gone: {error}") from error
+            raise Disconnected(LINE_GONE) from error  # what pyserial says is of its own parts
 
 
+LINE_GONE = "the line is gone: look at its plug and at the gun's power"
 IN_USE = "another program, or another run, has it open: close that first"
 
 
