@@ -200,6 +200,7 @@ MACHINE = Machine(system="Linux", python="3.11.7", cores=2, versions={"numpy": "
 TICKS = Ticks(resolution_s=1e-9, smallest_step_s=4e-8, oversleep_ms=FAST)
 DISK = Appends(append_ms=FAST, free_bytes=10**10)
 LINK = GunLine(gun="RG-1:7", state="disarmed", fault=None, round_trip_ms=FAST)
+TWICE = replace(LINK, state="fault", fault="coil open", clock_jumps=2)
 BROKEN = ConformanceFinding(check="trials", kept=False, said="a pulse of 0.01 s lasted 0.02 s")
 ADAPTER = Adapter(name="ttyUSB0", setting="sys/ttyUSB0/latency_timer", latency_ms=1)
 DISPLAY = Display(platform="xcb", width_px=1280, height_px=800, refresh_Hz=60.0, opened_ms=20.0)
@@ -228,6 +229,7 @@ KEYS = Keys(injected=2, to_event_ms=[0.4, 0.5], to_painted_ms=[0.8, 0.9])
         (verdicts.of_link(replace(LINK, fault="coil open"), 0.010), "fails", "switch off"),
         (verdicts.of_link(replace(LINK, clock_jumps=1), 0.010), "good", ""),
         (verdicts.of_link(replace(LINK, clock_jumps=2), 0.010), "fails", "leave ?speed out"),
+        (verdicts.of_link(TWICE, 0.010), "fails", "anybody holds it; its clock does not go as the address says"),
         (verdicts.not_fired(), "fails", "see to what “gun” says"),
         (verdicts.of_conformance([BROKEN]), "fails", "nobody may hold this gun"),
         (verdicts.of_link_failure("no answer"), "fails", "cable"),

@@ -171,18 +171,20 @@ MOST_JUMPS = 1
 
 def of_link(found: figures.GunLine, limit_s: float) -> figures.DoctorFinding:
     """The gun and the way to it, whose 95th percentile is to keep a limit."""
-    measured = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}"
+    measured, wrong = f"{found.gun}, {found.state}; round trip {_tail(found.round_trip_ms)}", list[str]()
+    if found.fault is not None or found.state != "disarmed":
+        wrong.append("switch off the gun's power, remove the cause, and look again before anybody holds it")
+        measured += "" if found.fault is None else f"; fault: {found.fault}"
     if found.clock_jumps > MOST_JUMPS:
         measured += f"; its clock contradicted this machine's {found.clock_jumps} times"
-        advice = (
+        wrong.append(
             "its clock does not go as the address says, so no shot's time would be believed: leave ?speed out, unless "
             "a twin in a hurry answers there, and then give its speed"
         )
-        return figures.DoctorFinding(check="gun", verdict="fails", measured=measured, advice=advice, figures=found)
-    if found.fault is not None or found.state != "disarmed":
-        advice = "switch off the gun's power, remove the cause, and look again before anybody holds it"
-        measured += "" if found.fault is None else f"; fault: {found.fault}"
-        return figures.DoctorFinding(check="gun", verdict="fails", measured=measured, advice=advice, figures=found)
+    if wrong:
+        return figures.DoctorFinding(
+            check="gun", verdict="fails", measured=measured, advice="; ".join(wrong), figures=found
+        )
     advice = (
         f"95th percentile above the limit of {1000 * limit_s:g} ms (the gun's serial.round_trip_limit_s): close other "
         "programs; at a USB serial adapter set its latency timer to 1 ms, see below"
