@@ -230,6 +230,15 @@ def test_a_key_tells_the_direction_and_when_it_went_down(link, hands, console, m
     assert in_order == sorted(in_order)
 
 
+def test_a_digit_of_the_number_pad_is_that_digit(link, hands, console):
+    show(link, "Please wait")
+    digits = tuple(replace(one, key=key) for one, key in zip(WHICH.answers, "12", strict=True))
+    question = replace(WHICH, answers=digits, onset_s=time.monotonic())
+    answer = hands.changing(lambda: console.submit(link.ask_choice, question))
+    hands.key("KP_2")
+    assert answer.result(PATIENCE_S).response == "backward"
+
+
 def test_a_key_before_the_onset_is_no_answer_but_one_before_the_question_stands_is(link, hands):
     question = replace(WHICH, onset_s=time.monotonic())
     time.sleep(FAR_S)  # farther than the two clocks may be apart: else the key may seem to be before the onset

@@ -397,6 +397,16 @@ class KeyDown:
     pressed_s: float
 
 
+def key_named(name: str) -> str:
+    """A key as answers have it, by PsychoPy's name: a digit is one on the number pad as well.
+
+    >>> key_named("num_2"), key_named("num_enter"), key_named("left")
+    ('2', 'num_enter', 'left')
+    """
+    digit = name.removeprefix("num_")
+    return digit if digit.isdecimal() else name
+
+
 class KeyPresses:
     """The last keys that went down, oldest first."""
 
@@ -416,6 +426,6 @@ class KeyPresses:
         """Take what PsychoPy holds. It gives keys still down and keys let go apart, a key that was both twice."""
         for released in (False, True):
             for found in self._board.getKeys(waitRelease=released):
-                press = KeyDown(name=str(found.name), pressed_s=float(found.tDown) + self._epoch_s)
+                press = KeyDown(name=key_named(str(found.name)), pressed_s=float(found.tDown) + self._epoch_s)
                 if press not in self._presses:
                     self._presses.append(press)
