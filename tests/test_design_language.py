@@ -99,6 +99,10 @@ def asked(**keys):
             "only a choice or yes-no can be right",
         ),
         ({"questions": asked(keys={"third": "t"})}, "keys has third, which is no answer"),
+        (
+            {"questions": {"q": {"kind": "text", "text": "?", "keys": {"one": "x"}}}},
+            "keys has one, which is no answer; a question of kind 'text' has none; remove the key",
+        ),
         ({"questions": asked(keys={"first": "x", "second": "x"})}, "'x' stands for more than one answer"),
         ({"questions": asked(keys={"first": "F1"})}, "questions.q.keys.first = 'F1'"),
         ({"questions": asked(labels={"first": "one", "second": "one"})}, "'one' stands for more than one answer"),

@@ -147,6 +147,19 @@ REFUSED = {
         HURRY, HURRY, "sets = 6", "sets = 4",
         ("order.sets = 4 cannot be shared equally among the 3 combinations of order.set", "nearest: 3 or 6"),
     ),
+    "sets that share out the instructions and not the trials": Broken(
+        HURRY, HURRY, "sets = 6", "sets = 9",
+        ("order.sets = 9: the 30 trials of a session cannot be shared equally", "nearest: 6 or 15"),
+    ),
+    "trials that no number of sets can share": Broken(
+        HURRY, HURRY, "repetitions = 15", "repetitions = 4",
+        ("order.sets = 6: the 8 trials", "no number can, as 8 trials are no multiple of 3: change order.repetitions"),
+        "sets = 6",
+    ),
+    "neither the instructions nor the trials": Broken(
+        HURRY, HURRY, "sets = 6", "sets = 20",
+        ("order.sets = 20 cannot be shared equally among the 3 combinations", "nearest: 15 or 30"),
+    ),
     "instructions that are in no set": Broken(
         HURRY, HURRY, 'set = ["instruction"]', "", ("order.set: instructions are read out before a set", "name it in"),
     ),

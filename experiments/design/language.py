@@ -364,10 +364,11 @@ def _answer_problems(question: QuestionConfig) -> Iterator[str]:
         yield "answers: a choice is among at least two; name them, or use another kind"
     if kind != "choice" and question.answers:
         yield f"answers: a question of kind {kind!r} has none; remove the key"
+    known = f"the answers are {', '.join(named)}" if named else f"a question of kind {kind!r} has none; remove the key"
     for key, table in {"labels": question.labels, "keys": question.keys}.items():
         unknown = [name for name in table if name not in named]
         if unknown:
-            yield f"{key} has {', '.join(unknown)}, which is no answer; the answers are {', '.join(named)}"
+            yield f"{key} has {', '.join(unknown)}, which is no answer; {known}"
     yield from _doubled("labels", [question.label(name) for name in named], "answer")
     yield from _doubled("keys", [*question.keys.values()], "answer")
 

@@ -190,7 +190,7 @@ def _session(design: DesignConfig, number: int, given: Condition, streams: Strea
 def _parts(design: DesignConfig, given: Condition, streams: Streams, row: int | None) -> list[list[Content]]:
     """What each set of a session holds, in order, where all levels are planned."""
     contents, sets = trial_contents(design, given, streams), design.order.sets
-    check_sets(design, len(contents))
+    check_sets(design, len(contents), len(cells(design, design.order.set, given)))
     if design.order.trials != "random":
         return _by_square(design, contents, row, sets)
     if design.order.longest_run:
@@ -203,9 +203,13 @@ def _set_levels(design: DesignConfig, given: Condition, streams: Streams) -> lis
     """The levels of each set: each combination equally often, in random order."""
     found, sets = cells(design, design.order.set, given), design.order.sets
     if sets % len(found):
-        raise ConfigError(
-            f"order.sets = {sets} cannot be shared equally among the {len(found)} combinations of order.set; "
+        nearest = (
             f"nearest: {_multiples(sets, len(found))}"
+            if design.adaptive
+            else _nearest_sets(sets, len(trial_contents(design, given, streams)), len(found))
+        )
+        raise ConfigError(
+            f"order.sets = {sets} cannot be shared equally among the {len(found)} combinations of order.set; {nearest}"
         )
     return streams.of("set-order").shuffled(found * (sets // len(found)))
 
@@ -215,20 +219,29 @@ def _multiples(value: int, of: int) -> str:
     return " or ".join(str(one) for one in (below, above) if one)
 
 
-def check_sets(design: DesignConfig, trials: int) -> None:
-    """`ConfigError` unless the trials of a session share out equally among its sets, as `balance` asks."""
+def _nearest_sets(sets: int, trials: int, combinations: int) -> str:
+    """Which numbers of sets share out both the trials and the combinations of levels that a set can have."""
+    near = [n for n in range(combinations, trials + 1, combinations) if trials % n == 0]
+    below = max((n for n in near if n < sets), default=None)
+    above = min((n for n in near if n > sets), default=None)
+    if not near:
+        return f"no number can, as {trials} trials are no multiple of {combinations}: change order.repetitions"
+    return f"nearest: {' or '.join(str(n) for n in (below, above) if n)}"
+
+
+def check_sets(design: DesignConfig, trials: int, combinations: int = 1) -> None:
+    """`ConfigError` unless the trials of a session share out equally among its sets, as `balance` asks.
+
+    `combinations`: of the levels of `order.set`, each of which has as many sets; they bound what is advised.
+    """
     order = design.order
     ranked = [name for name, question in design.questions.items() if question.kind == "ranking"]
     if ranked and trials == order.sets:
         raise ConfigError(f"questions.{ranked[0]}: sets of one trial leave nothing to rank; make order.sets smaller")
     if trials % order.sets:
-        near = [n for n in range(1, trials + 1) if trials % n == 0]
-        below = max((n for n in near if n < order.sets), default=None)
-        above = min((n for n in near if n > order.sets), default=None)
-        shown = " or ".join(str(n) for n in (below, above) if n)
         raise ConfigError(
             f"order.sets = {order.sets}: the {trials} trials of a session cannot be shared equally among them; "
-            f"nearest: {shown}"
+            f"{_nearest_sets(order.sets, trials, combinations)}"
         )
     if order.balance == "set-exact" and order.repetitions % order.sets:
         raise ConfigError(
