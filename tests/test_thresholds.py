@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -223,6 +224,45 @@ def test_a_comparison_with_a_standard_counts_how_often_the_level_was_chosen(ship
         rows = table[table["voltage_V"] == point.level]
         chosen = rows["correct"] if point.level > 14.0 else 1 - rows["correct"]
         assert point.right == chosen.sum()
+
+
+def of_a_standard(standard: float, *, above: bool) -> Any:
+    """The summary of two people who say which interval held the comparison, all levels on one side of the standard."""
+    one = design(
+        factors={"method": {"levels": ["asymmetric-1"]}, "voltage_V": {"levels": list(LEVELS)}},
+        trial={"kind": "two-interval", "compare": "voltage_V", "standard": standard},
+        questions={
+            "which": {"kind": "choice", "text": "Which?", "answers": ["first", "second"], "correct": "interval"}
+        },
+    )
+    distance = {level: level - standard if above else standard - level for level in LEVELS}
+    rows = [
+        {"participant_id": who, "method": "asymmetric-1", "voltage_V": level, "which": "first", "correct": int(right)}
+        for who in ("A", "B")
+        for level in LEVELS
+        for right in np.arange(60) < round(60 * (0.5 + 0.5 * share(distance[level], 4.0, 1.0)))
+    ]
+    return summarise(one, pd.DataFrame(rows))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("standard", "way"), [(5.0, "above"), (15.0, "below")])
+def test_what_is_just_noticed_of_levels_told_from_a_standard_is_how_far_the_threshold_is_from_it(
+    standard: float, way: str
+) -> None:
+    """Half the distance between the quarters is no JND of them: truth is a threshold 4 V from the standard."""
+    summary = of_a_standard(standard, above=way == "above")
+    (sentence,) = threshold_sentences(summary, summary.questions["which"])
+    shown = re.search(
+        rf", (\S+) \[(\S+), (\S+)\] {way} the standard of {standard:g} \(Weber fraction (\S+)\)", sentence
+    )
+    assert shown is not None, sentence
+    far, low, high, weber = (float(number) for number in shown.groups())
+    assert far == pytest.approx(4.0, abs=0.3)
+    assert low < far < high
+    assert weber == pytest.approx(far / standard, abs=0.006)
+    (section,) = threshold_sections("made", summary)
+    assert "JND" not in sentence + "".join(name for table in section.tables for name in table.header)
 
 
 def test_what_has_no_success_or_no_single_function_is_not_fitted() -> None:

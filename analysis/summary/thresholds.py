@@ -66,9 +66,10 @@ class ConditionDifference:
 class Thresholds:
     """The psychometric functions of one question over `factor`; none with a `reason`.
 
-    `share`: of what, right answers, yes, or the level chosen over the standard. `guess`: chance where the design knows
-    it. Of the `people` so many were `fitted`. `even`: trials whose two intervals had the same level. `tracks`: of a
-    procedure that chose the levels from the answers; `own_priors`: its priors of width and lapse rate are the fit's.
+    `share`: of what, right answers, yes, or the level chosen over the standard. `standard`: what levels were compared
+    with. `guess`: chance where the design knows it. Of the `people` so many were `fitted`. `even`: trials whose two
+    intervals had the same level. `tracks`: of a procedure that chose the levels from the answers; `own_priors`: its
+    priors of width and lapse rate are the fit's.
     """
 
     factor: str
@@ -85,6 +86,11 @@ class Thresholds:
     reason: str | None = None
     tracks: tuple[TrackAnswers, ...] = field(default=(), repr=False, metadata=UNWRITTEN)
 
+    @property
+    def told_from(self) -> float | None:
+        """The number of the standard that levels were told from: the distance of the threshold is what is noticed."""
+        return None if self.share != "right" or not isinstance(self.standard, float) else self.standard
+
 
 def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybody: bool = False) -> Thresholds | None:
     """The functions of a question from the table of its design; `None` of one that has none.
@@ -96,8 +102,7 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     if factor is None or share is None:
         return None
     known = chance(question) if share == "right" else None
-    standard = design.trial.standard if share == "chosen" else None
-    found = Thresholds(factor=factor, share=share, guess=known, standard=standard)
+    found = Thresholds(factor=factor, share=share, guess=known, standard=design.trial.standard)
     if why := _unordered(design, factor, share):
         return replace(found, reason=why)
     level = pd.to_numeric(table[factor], errors="coerce")

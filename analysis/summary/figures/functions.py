@@ -176,7 +176,7 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
     if of.guess is not None:
         for axes in grid:
             reference_line(axes, 100 * of.guess, "")
-    if of.standard is not None and not isinstance(of.standard, str):
+    if of.share == "chosen" and isinstance(of.standard, float):
         for axes in grid:
             axes.axvline(of.standard, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     grid[0].set_ylim(-3.0, 103.0)

@@ -17,7 +17,7 @@ from analysis.summary.results import DesignSummary
 from analysis.summary.sections.pictures import functions_figure_of, tracks_figure_of
 from analysis.summary.thresholds import ConditionFit, Thresholds
 from device.words import how_many
-from experiments.design.language import Level
+from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words
 
 _SHARES = {"right": "right answers", "yes": "yes", "chosen": "choices of the level over the standard"}
@@ -42,26 +42,43 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
         yield f"No psychometric function: {of.reason}."
     told = [one for one in of.conditions if one.group is not None]
     if told:
-        digits = _digits(of)
-        shown = "; ".join(f"{_condition(found, one.levels)}{_group_words(one, digits)}" for one in told[:_TOLD])
+        shown = "; ".join(f"{_condition(found, one.levels)}{_group_words(of, one)}" for one in told[:_TOLD])
         more = f"; and of {len(told) - _TOLD} more conditions" if len(told) > _TOLD else ""
         over = "people" if of.fitted == of.people else f"{of.fitted:,} of {of.people:,} people"
         yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over {over}: {shown}{more}."
 
 
-def _group_words(one: ConditionFit, digits: int | None) -> str:
+def _group_words(of: Thresholds, one: ConditionFit) -> str:
     if one.group is None:
         return ""
     if not _has_threshold(one):
         return "nobody has one within the levels"
-    jnd = _number(one.group.jnd.median, digits)
+    digits, threshold = _digits(of), one.group.threshold
+    jnd = (
+        f"JND {_number(one.group.jnd.median, digits)}"
+        if of.told_from is None
+        else _noticed(of.told_from, threshold, digits)
+    )
     some = f" (of {one.group.people} of {len(one.people)} people)" if one.group.people < len(one.people) else ""
-    return f"{_number(one.group.threshold.median, digits)} {_ends(one.group.threshold, digits)}, JND {jnd}{some}"
+    return f"{_number(threshold.median, digits)} {_ends(threshold, digits)}, {jnd}{some}"
+
+
+def _noticed(standard: float, threshold: Credible, digits: int | None) -> str:
+    """How far a threshold is from the standard, and the Weber fraction: what others call the JND of such trials."""
+    way, sign = ("below", -1.0) if threshold.median < standard else ("above", 1.0)
+    far, *ends = (_number(sign * (end - standard), digits) for end in (threshold.median, threshold.low, threshold.high))
+    weber = f" (Weber fraction {apa.number(abs(threshold.median / standard - 1.0))})" if standard > 0 else ""
+    return f"{far} [{', '.join(ends[:: int(sign)])}] {way} the standard of {shown_level(standard)}{weber}"
 
 
 def _has_threshold(one: ConditionFit) -> bool:
     """Whether the group's mean rests on anybody's threshold, and not on the prior alone."""
     return one.group is not None and one.group.without < one.group.people
+
+
+def _spread(of: Thresholds) -> str:
+    """What half the distance between the quarters is called: no JND where levels were told from a standard."""
+    return "JND" if of.told_from is None else "Spread"
 
 
 def _measure(of: Thresholds) -> str:
@@ -91,12 +108,13 @@ def _what(of: Thresholds) -> str:
     if of.share != "chosen":
         right = "" if of.guess is None else f", {apa.percent((1 + of.guess) / 2, 0)} where nobody lapses"
         halfway = f"the level halfway between guess and lapse rate{right}"
+    noticed = "" if of.told_from is None else "; what is just noticed is how far the threshold is from the standard"
     return (
         f"The share of {_SHARES[of.share]} {way} with {factor_words(of.factor)} as a cumulative normal, fitted person "
         f"by person on a grid of threshold, width and rates ({guess}; lapse rate fitted; {_PRIORS[of.own_priors]}). "
-        f"{_measure(of).capitalize()}: {halfway}. JND: half the distance between the levels at a quarter and three "
-        "quarters of the way. Numbers are medians with 95 % credible intervals; the means over people and the pooled "
-        "values draw people towards each other, the more the less their own answers tell."
+        f"{_measure(of).capitalize()}: {halfway}. {_spread(of)}: half the distance between the levels at a quarter and "
+        f"three quarters of the way{noticed}. Numbers are medians with 95 % credible intervals; the means over people "
+        "and the pooled values draw people towards each other, the more the less their own answers tell."
     )
 
 
@@ -185,7 +203,7 @@ def threshold_words(found: DesignSummary, of: Thresholds) -> Iterator[str]:
     """Each condition's threshold in the group, or one person's."""
     for one in of.conditions[:_TOLD]:
         if one.group is not None:
-            yield f"{_condition(found, one.levels)}{_group_words(one, _digits(of))}"
+            yield f"{_condition(found, one.levels)}{_group_words(of, one)}"
         elif one.people and (fit := one.people[0].fit) is not None:
             shown = one.people[0].reason or _number(fit.threshold.median, _digits(of))
             yield f"{_condition(found, one.levels)}{shown}"
@@ -211,7 +229,7 @@ def _tables(asked: str, found: DesignSummary, of: Thresholds) -> Iterator[Table]
 
 def _groups(asked: str, found: DesignSummary, of: Thresholds, digits: int | None) -> Table:
     conditions = ("Condition",) if of.conditions[0].levels else ()
-    measured = f"{_measure(of).capitalize()}, mean", "95 % interval", "SD", "JND", "95 % interval"
+    measured = f"{_measure(of).capitalize()}, mean", "95 % interval", "SD", _spread(of), "95 % interval"
     return Table(
         caption=f"{asked}: {_measure(of)} over people, in {factor_words(of.factor)}",
         header=(*conditions, "People", *measured, "Without"),
@@ -267,7 +285,8 @@ def _people(asked: str, found: DesignSummary, of: Thresholds, digits: int | None
         header=(
             "Participant",
             *(("Condition",) if of.conditions[0].levels else ()),
-            *("Trials", _measure(of).capitalize(), "95 % interval", "Pooled", "JND", "95 % interval", "Slope", "Lapse"),
+            *("Trials", _measure(of).capitalize(), "95 % interval", "Pooled", _spread(of), "95 % interval"),
+            *("Slope", "Lapse"),
             *(("Guess",) if guessed else ()),
             *("p", "Remark"),
         ),
