@@ -124,6 +124,29 @@ def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_the_comparison_being_right_on_both_sides_of_the_standard_is_a_warning(tmp_path):
+    """Asked for the stronger shot, everybody who feels it would be wrong wherever the standard is the stronger one."""
+    larger, interval = 'correct = "larger"', 'correct = "interval"'
+    (told,) = check(written(tmp_path, "stronger", (larger, interval)), None, 1).warnings
+    assert "questions.stronger.correct = 'interval'" in told
+    assert "below the standard of 14; if the larger one is asked for, say larger" in told
+    above = ("levels = [11.0, 12.0, 13.0, 15.0, 16.0, 17.0]", "levels = [15.0, 16.0, 17.0]")
+    (tmp_path / "above").mkdir()
+    one_side = check(written(tmp_path / "above", "stronger", (larger, interval), above), None, 1)
+    assert not [one for one in one_side.warnings if "interval" in one]
+
+
+@pytest.mark.slow
+def test_a_level_that_is_no_shot_and_counts_as_a_stimulus_is_a_warning(tmp_path):
+    levels = ("[factors.pulse_s]\nlevels = [", "[factors.pulse_s]\nlevels = [0.0, ")
+    moving = ('design = "detection"', 'design = "detection"\nbelow_break_away = true')
+    told = check(written(tmp_path, "detection", levels, moving), None, 1).warnings
+    (warning,) = [one for one in told if "factors" in one]
+    assert warning.startswith("factors.pulse_s: its level 0 is no shot, and “no” is wrong there all the same")
+    assert not [one for one in found("detection").warnings if "is no shot" in one]
+
+
 def test_a_key_that_begins_a_word_of_another_answer_is_a_warning(tmp_path):
     keys = 'answers = ["forward", "backward"]'
     alike = 'labels = { forward = "a kick", backward = "a knock" }'

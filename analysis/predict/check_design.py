@@ -19,7 +19,7 @@ from experiments.catalogues.catalogue import language
 from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.design.language import shown_level
+from experiments.design.language import DRIVEN, NO, shown_level
 from experiments.design.methods_section import methods_section
 from experiments.design.plan import Condition, Plan
 from experiments.design.planned import (
@@ -229,6 +229,7 @@ def _warnings(
 ) -> Iterator[str]:
     yield from warnings(design, planned)
     yield from _key_warnings(design)
+    yield from _score_warnings(design)
     if shaken.a8_m_s2 > shaken.action_m_s2:
         yield (
             f"the vibration of {shaken.a8_m_s2:.2f} m/s² A(8) exceeds the action value of {shaken.action_m_s2:g} of "
@@ -257,6 +258,25 @@ def _key_warnings(design: DesignConfig) -> Iterator[str]:
                 f"questions.{name}: {key} is the key of “{pressed.label}”, and “{heard.label}” has a word with {key} "
                 "as well: whoever hears it may press the wrong key; label them with words that begin otherwise"
             )
+
+
+def _score_warnings(design: DesignConfig) -> Iterator[str]:
+    """What is scored otherwise than most who write it so mean, which shows when all data are there."""
+    trial = design.trial
+    levels, standard = design.factors[trial.compare].all_levels if trial.compare else (), trial.standard
+    below = [level for level in levels if isinstance(level, float) and isinstance(standard, float) and level < standard]
+    for name, question in design.questions.items():
+        if question.correct == "interval" and trial.kind == "two-interval" and 0 < len(below) < len(levels):
+            yield (
+                f"questions.{name}.correct = 'interval': right is the interval of the comparison, also where it is "
+                f"below the standard of {shown_level(standard or 0.0)}; if the larger one is asked for, say larger"
+            )
+        for factor in DRIVEN if question.correct == "stimulus" else ():
+            if factor in design.factors and 0.0 in design.factors[factor].all_levels:
+                yield (
+                    f"factors.{factor}: its level 0 is no shot, and “{question.label(NO)}” is wrong there all the "
+                    "same; take it out: trial.catch has the trials without a stimulus"
+                )
 
 
 def design_sections(found: DesignCheck) -> tuple[Section, ...]:
