@@ -138,6 +138,19 @@ def test_the_comparison_being_right_on_both_sides_of_the_standard_is_a_warning(t
 
 
 @pytest.mark.slow
+def test_answers_about_a_pair_that_are_not_called_first_and_second_are_told_with_what_they_count_as(tmp_path):
+    """“left, equal, right” would count each “equal” as a choice of the second shot, and each “right” as a tie."""
+    own = ('answers = ["first", "second"]\n', 'answers = ["left", "equal", "right"]\n')
+    keys = ('keys = { first = "left", second = "right" }', "")
+    answering = 'law = "shares"\nshare.all = { left = 0.4, equal = 0.2, right = 0.4 }\n'
+    path = written(tmp_path, "pairs", own, keys, ('"synthetic/pairs.toml"', '"own.toml"'))
+    (tmp_path / "own.toml").write_text(f"[questions.rather]\n{answering}")
+    (told,) = [one for one in check(path, None, 1).warnings if one.startswith("questions.")]
+    assert "of a pair “left” counts as a choice of the first interval, “equal” of the second, and “right” as a" in told
+    assert not found("pairs", 1).warnings
+
+
+@pytest.mark.slow
 def test_a_level_that_is_no_shot_and_counts_as_a_stimulus_is_a_warning(tmp_path):
     levels = ("[factors.pulse_s]\nlevels = [", "[factors.pulse_s]\nlevels = [0.0, ")
     moving = ('design = "detection"', 'design = "detection"\nbelow_break_away = true')

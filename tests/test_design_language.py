@@ -89,6 +89,15 @@ def asked(**keys):
         ({"factors": VOLTS, "trial": INTERVALS | {"catch": 3}}, "catch trials are of one interval"),
         ({"factors": ONE, "trial": {"kind": "pair", "compare": "method"}}, "makes no pair"),
         (
+            {
+                "factors": VOLTS,
+                "trial": {"kind": "pair", "compare": "voltage_V"},
+                "questions": asked(answers=["first", "same", "second"]),
+            },
+            "questions.q: answers: second is not in its place; of a pair the first answer chooses the first interval, "
+            "the second the other, and any more is a tie: write first, second, same",
+        ),
+        (
             {"factors": VOLTS, "trial": INTERVALS, "order": {"session": ["voltage_V"]}},
             "is constant in a block or person",
         ),

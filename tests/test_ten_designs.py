@@ -112,6 +112,21 @@ def test_who_is_worth_more_is_chosen_more_often():
     assert sorted(chosen, key=chosen.get) == ["vibration", "soft", "short", "paper", "strong"]
 
 
+@pytest.mark.slow
+def test_a_third_answer_is_a_tie_as_often_as_davidson_has_it():
+    """Of two that are worth the same, a tie has the share tie / (2 + tie)."""
+    pairs, gun, _ = loaded("pairs")
+    tables = pairs.model_dump()
+    tables["questions"]["rather"] |= {"answers": ("first", "second", "same")}
+    three = DesignConfig.model_validate(tables)
+    alike = dict.fromkeys(three.factors["method"].all_levels, 1.7)
+    laws = {"rather": {"law": "worth", "factor": "method", "worth": alike, "tie": 0.5}}
+    plans = [plan_of(three, f"P{at}", 1) for at in range(60)]
+    given = [one.value for plan in plans for one in answered_by(three, gun, laws, plan)]
+    assert given.count("same") / len(given) == pytest.approx(0.2, abs=0.035)  # 1,200 answers: three standard errors
+    assert given.count("first") / len(given) == pytest.approx(0.4, abs=0.045)
+
+
 def test_a_group_keeps_its_level():
     assert {next(iter(plan.trials)).level("grip") for _, plan, _ in people("grip", 2)} == {"one hand", "two hands"}
 
@@ -124,6 +139,18 @@ def answered_by(design, gun, laws, plan):
 @pytest.mark.parametrize(
     ("name", "laws", "said"),
     [
+        (
+            "pairs",
+            {
+                "rather": {
+                    "law": "worth",
+                    "factor": "method",
+                    "worth": dict.fromkeys(("vibration", "soft", "short", "paper", "strong"), 1.0),
+                    "tie": 0.5,
+                }
+            },
+            "questions.rather.tie = 0.5: no third answer is a tie; name one, or remove the key",
+        ),
         (
             "pairs",
             {"rather": {"law": "rates", "share": {"all": 0.5}}},

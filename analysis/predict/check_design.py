@@ -19,7 +19,7 @@ from experiments.catalogues.catalogue import language
 from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.design.language import DRIVEN, NO, shown_level
+from experiments.design.language import DRIVEN, INTERVAL_NAMES, NO, shown_level
 from experiments.design.methods_section import methods_section
 from experiments.design.plan import Condition, Plan
 from experiments.design.planned import (
@@ -230,6 +230,7 @@ def _warnings(
     yield from warnings(design, planned)
     yield from _key_warnings(design)
     yield from _score_warnings(design)
+    yield from _pair_warnings(design)
     if shaken.a8_m_s2 > shaken.action_m_s2:
         yield (
             f"the vibration of {shaken.a8_m_s2:.2f} m/s² A(8) exceeds the action value of {shaken.action_m_s2:g} of "
@@ -277,6 +278,18 @@ def _score_warnings(design: DesignConfig) -> Iterator[str]:
                     f"factors.{factor}: its level 0 is no shot, and “{question.label(NO)}” is wrong there all the "
                     "same; take it out: trial.catch has the trials without a stimulus"
                 )
+
+
+def _pair_warnings(design: DesignConfig) -> Iterator[str]:
+    """What the answers about a pair are counted as, where their names do not say it."""
+    for name, question in design.questions.items() if design.trial.kind == "pair" else ():
+        if question.answers and question.answers[:2] != INTERVAL_NAMES[:2]:
+            one, other, *more = map(question.label, question.answers)
+            tie = f", and “{'” or “'.join(more)}” as a tie" if more else ""
+            yield (
+                f"questions.{name}.answers: of a pair “{one}” counts as a choice of the first interval, “{other}” of "
+                f"the second{tie}; if that is meant, call them first and second"
+            )
 
 
 def design_sections(found: DesignCheck) -> tuple[Section, ...]:

@@ -182,6 +182,7 @@ def _problems(design: DesignConfig) -> Iterator[str]:
         yield from procedure_problems(design.adaptive, design.factors, design.order, design.trial, design.questions)
     for name, question in design.questions.items():
         yield from (f"questions.{name}: {problem}" for problem in _right_answer_problems(design, question))
+        yield from (f"questions.{name}: {problem}" for problem in _pair_answer_problems(design, question))
     unknown = sorted(set(design.assumed) - set(leaves(design)))
     if unknown:
         yield f"assumed names {', '.join(unknown)}, which this design does not have; name existing keys"
@@ -419,6 +420,18 @@ def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> It
             yield f"correct = {question.correct!r}: {shown}"
     if question.when == "block":
         yield "when = 'block': a question about remembered trials is not scored; remove `correct`"
+
+
+def _pair_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
+    """An answer about a pair is counted by its place: another order would score ties as choices."""
+    of_pair, answers = INTERVAL_NAMES[:2], question.answers
+    misplaced = [one for at, one in enumerate(of_pair) if one in answers and answers[at] != one]
+    if misplaced and design.trial.kind == "pair":
+        rest = [one for one in answers if one not in of_pair]
+        yield (
+            f"answers: {misplaced[0]} is not in its place; of a pair the first answer chooses the first interval, the "
+            f"second the other, and any more is a tie: write {', '.join((*of_pair, *rest))}"
+        )
 
 
 def _interval_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:

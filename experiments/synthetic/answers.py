@@ -214,7 +214,8 @@ class SyntheticParticipant:
                 return on_scale(float(f"{number:.3g}"), question.scale)
             case WorthLaw():
                 worths = [self._worth(law, level, name) for level in trial.intervals]
-                return question.named_answers[_drawn(worths, draws)]
+                tie = law.tie * math.sqrt(math.prod(worths))
+                return question.named_answers[_drawn([*worths, *([tie] if tie else [])], draws)]
             case WordsLaw():
                 return law.texts[draws.below(len(law.texts))]
             case _:

@@ -148,12 +148,16 @@ class PowerLaw(Model):
 
 
 class WorthLaw(Model):
-    """Bradley and Terry: the first of a pair is chosen with w1 / (w1 + w2); ranks are drawn one after another."""
+    """Bradley and Terry: the first of a pair is chosen with w1 / (w1 + w2); ranks are drawn one after another.
+
+    Of three answers the third is a tie, as likely as `tie` sqrt(w1 w2) beside w1 and w2 (Davidson 1970).
+    """
 
     law: Literal["worth"]
     factor: ColumnName
     worth: dict[str, Positive]
     log_worth_sd: Spread = 0.0
+    tie: Annotated[float, Field(ge=0, le=1e3)] = 0.0
 
 
 class WordsLaw(Model):
@@ -372,11 +376,14 @@ def _worth_problems(design: DesignConfig, question: QuestionConfig, law: WorthLa
     missing = [one for one in map(shown_level, design.factors[law.factor].all_levels) if one not in law.worth]
     if missing:
         yield f".worth has no value for {', '.join(missing)}; give one for each level"
-    if question.kind == "choice" and (law.factor != design.trial.compare or len(question.named_answers) != 2):
+    answers = question.named_answers
+    if question.kind == "choice" and (law.factor != design.trial.compare or len(answers) not in (2, 3)):
         yield (
-            ".law = 'worth': of a choice it says which of the two intervals is chosen, so its factor is trial.compare; "
-            "here use the law shares"
+            ".law = 'worth': of a choice it says which of the two intervals is chosen, or with a third answer that "
+            "neither is, so its factor is trial.compare; here use the law shares"
         )
+    elif law.tie and len(answers) != 3:
+        yield f".tie = {law.tie:g}: no third answer is a tie; name one, or remove the key"
 
 
 def _diffusion_problems(design: DesignConfig, question: QuestionConfig, law: DiffusionLaw) -> Iterator[str]:
