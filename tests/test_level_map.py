@@ -91,7 +91,7 @@ def test_levels_of_every_size_are_told_in_three_figures(lab: Path, exponent: str
     text = (lab / "lab.csv").read_text()
     (lab / "lab.csv").write_text(re.sub(r"(\d+,5);", rf"\g<1>{exponent};", text))
     (told,) = thresholds_in_short(mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")).items
-    assert re.search(f"mean over people: links: {shown}", told)
+    assert re.search(f"mean over people with its 95 % credible interval: links: {shown}", told)
     rows = [
         line for line in (lab / "out" / "report.md").read_text().splitlines() if line.startswith(("| 0", "| links"))
     ]

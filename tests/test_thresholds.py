@@ -172,7 +172,7 @@ def test_too_few_answers_are_no_fit_and_too_many_people_are_sampled(config: Desi
     twice = answered(config, {(f"P{i:03d}", "asymmetric-1"): 10.0 for i in range(MOST_FITTED + 3)}, trials=2)
     found = summarise(config, twice)
     (told,) = threshold_sentences(found, found.questions["response"])
-    assert f", mean over {MOST_FITTED} of {MOST_FITTED + 3} people: " in told
+    assert f", mean over {MOST_FITTED} of {MOST_FITTED + 3} people with its 95 % credible interval: " in told
     every = thresholds(config, "response", crowd, everybody=True)
     assert every is not None
     assert every.fitted == MOST_FITTED + 3
@@ -290,7 +290,10 @@ def test_the_pages_have_groups_differences_people_and_a_panel_each(
     assert {len(row) for table in section.tables for row in table.rows} == {8, 5, 12}
     assert all(len(row) == len(table.header) for table in section.tables for row in table.rows)
     (sentence,) = threshold_sentences(summary, summary.questions["response"])
-    assert sentence.startswith("Threshold in voltage in V, mean over people: Asymmetric Force I: 9.0")
+    assert sentence.startswith(
+        "Threshold in voltage in V, mean over people with its 95 % credible interval: Asymmetric Force I: 9.0"
+    )
+    assert section.tables[1].caption.endswith("own difference, which need not be that of the two means")
     assert not any("below 0" in paragraph for paragraph in section.paragraphs)
     figure_functions(summary, summary.questions["response"].thresholds, tmp_path / "functions")  # type: ignore[arg-type]
     assert (tmp_path / "functions.png").is_file()

@@ -45,7 +45,8 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
         shown = "; ".join(f"{_condition(found, one.levels)}{_group_words(of, one)}" for one in told[:_TOLD])
         more = f"; and of {len(told) - _TOLD} more conditions" if len(told) > _TOLD else ""
         over = "people" if of.fitted == of.people else f"{of.fitted:,} of {of.people:,} people"
-        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over {over}: {shown}{more}."
+        interval = " with its 95 % credible interval" if any(map(_has_threshold, told[:_TOLD])) else ""
+        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over {over}{interval}: {shown}{more}."
 
 
 def _group_words(of: Thresholds, one: ConditionFit) -> str:
@@ -252,8 +253,10 @@ def _group_cells(one: GroupFit, digits: int | None) -> tuple[str, ...]:
 
 def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int | None) -> Table:
     measured = [one.levels for one in of.conditions if _has_threshold(one)]
+    paired = any(one.threshold.within and one.threshold.people > 1 for one in of.differences)
+    own = ". Paired: the mean of everybody's own difference, which need not be that of the two means" if paired else ""
     return Table(
-        caption=f"{asked}: differences of the {_measure(of)}; without correction for their number",
+        caption=f"{asked}: differences of the {_measure(of)}; without correction for their number{own}",
         header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
         rows=tuple(
             (
