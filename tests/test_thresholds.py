@@ -448,6 +448,7 @@ def test_shares_that_a_procedure_held_are_neither_drawn_nor_compared_between_tra
     apart = summarise(both, table).questions["response"]
     within = summarise(shipped, table[table["method"] == METHODS[0]]).questions["response"]
     assert [apart.drawn, within.drawn] == [False, False]
+    assert {cell.p for one in (apart, within) for cell in one.cells} == {None}
     reasons = [str(test.reason) for found in (apart, within) for test in found.tests if test.name == "anova"]
     assert ["each method by the answers" in one for one in reasons] == [True, False]
 

@@ -273,7 +273,10 @@ def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.Da
         answers={one: int((rows[name] == one).sum()) for one in question.named_answers} or None,
         catch=int(first["stimulus"]) == 0 if "stimulus" in rows else None,
     )
-    return _with_right(described, int(rows["score"].sum()), chance(question)) if question.correct else described
+    if not question.correct:
+        return described
+    by_chance = None if _is_held(design, question) else chance(question)  # what is held at a share says nothing of it
+    return _with_right(described, int(rows["score"].sum()), by_chance)
 
 
 def _with_right(cell: ConditionSummary, right: int, by_chance: float | None) -> ConditionSummary:

@@ -344,7 +344,7 @@ def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> T
     factors = list(dict.fromkeys(factor for cell in question.cells for factor in cell.levels))
     scored = any(cell.right is not None for cell in question.cells)
     sd = {"number": "SD of ln", "choice": _SD_OF_SHARES, "yes-no": _SD_OF_SHARES}.get(question.kind, "SD")
-    last = ("95 % interval", *(["p against chance"] if question.chance is not None else [])) if scored else (sd,)
+    last = ("95 % interval", *(["p against chance"] if _against_chance(question) else [])) if scored else (sd,)
     caught = any(cell.catch and set(factors) <= set(cell.levels) for cell in question.cells)
     answers = () if question.preferred is not None else tuple(next(iter(question.cells)).answers or ())
     rows = tuple(
@@ -376,7 +376,12 @@ def _spread(question: QuestionSummary, cell: ConditionSummary, *, scored: bool) 
         shares = question.kind in _SHARES and cell.sd is not None
         return (apa.number(100.0 * cell.sd, 1) if shares and cell.sd is not None else apa.number(cell.sd),)
     interval = f"{apa.percent(cell.ci_low)} to {apa.percent(cell.ci_high)}"
-    return (interval, apa.p_cell(cell.p)) if question.chance is not None else (interval,)
+    return (interval, apa.p_cell(cell.p)) if _against_chance(question) else (interval,)
+
+
+def _against_chance(question: QuestionSummary) -> bool:
+    """Whether right answers were tested against chance: there is one, and no procedure held them at a share."""
+    return question.chance is not None and not question.held
 
 
 def _test(found: DesignSummary, question: QuestionSummary, test: DesignTest) -> tuple[str, ...]:
