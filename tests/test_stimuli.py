@@ -92,6 +92,11 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
             {"method": {"levels": ["vibration"]}, "voltage_V": {"levels": [12.0]}},
             "is a vibration, which has no voltage_V",
         ),
+        (
+            {"method": {"levels": ["vibration"]}, "peak_m_s2": {"levels": [100.0, 200.0]}},
+            "factors.peak_m_s2: method 'vibration' is a vibration of effect 1, with the numbers of that effect",
+        ),
+        ({"method": {"levels": ["vibration"]}, "effect": {"levels": [1.0, 2.0]}}, "and let `method` vary"),
         ({"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"frction_N": 1.0}}}}, "frction_N"),
         ({"method": STRONG, "damper": {"levels": ["on"], "sets": {"on": {"friction_N": -1.0}}}}, "friction_N is -1.0"),
         (

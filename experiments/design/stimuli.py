@@ -7,7 +7,7 @@ lab's own, is set by the experimenter's hand and confirmed; the model is told wh
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import cast
 
@@ -157,6 +157,7 @@ def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> Interva
     method = str(held[METHOD_FACTOR])
     if method not in gun.methods:
         raise ConfigError(f"factors.method: the gun has no method {method!r}; it has {', '.join(gun.methods)}")
+    _check_vibration(gun.rendering(method), held, method)
     parameters = _changed(gun.rendering(method), _numbers(design, held), method)
     try:
         drive = drive_of(parameters)
@@ -168,6 +169,19 @@ def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> Interva
         parameters=parameters,
         drive=drive,
     )
+
+
+def _check_vibration(parameters: Method, held: Mapping[str, Level], method: str) -> None:
+    """A hand would set what a factor calls as a number of the vibration, and every trial would fire one effect."""
+    named = [name for name in held if name in _NUMBERS_OF_VIBRATION]
+    if named and isinstance(parameters, VibrationParameters):
+        raise ConfigError(
+            f"factors.{named[0]}: method {method!r} is a vibration of effect {parameters.effect}, with the numbers of "
+            "that effect: make a method of each in the gun's file (`vibration.effect`), and let `method` vary"
+        )
+
+
+_NUMBERS_OF_VIBRATION = frozenset(field.name for field in fields(VibrationParameters))
 
 
 def _numbers(design: DesignConfig, held: Mapping[str, Level]) -> dict[str, tuple[str, float]]:
