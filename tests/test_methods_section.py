@@ -46,6 +46,7 @@ def test_what_nesting_makes_differ_is_told_of_every_group_and_session():
     )
     runs = [planned_run(nested, plan_of(nested, "P01", 1, group=group)) for group in (0, 1)]
     text = "\n".join(methods_section(nested, runs))
+    assert "Voltage in V (one: 9, 12; two: 9, 12, 16) and direction" in text
     assert "There were 2 or 3 sessions, each of one voltage in V" in text
     assert "In each session every condition came once, in random order: 2 trials." in text
     assert "The 4 or 6 trials were planned to take 4 or 6 s." in text

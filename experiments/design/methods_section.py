@@ -54,13 +54,13 @@ def _factors(design: DesignConfig) -> Iterator[str]:
     between = [(name, design.factors[name]) for name in design.between]
     constant = [(name, one) for name, one in design.factors.items() if not one.between and len(one.all_levels) == 1]
     if within:
-        yield f"{_sentence(within)} varied within participants."
+        yield f"{_sentence(design, within)} varied within participants."
     if design.adaptive is not None:
         yield from _chosen(design, design.adaptive)
     if between:
-        yield f"{_sentence(between)} varied between participants."
+        yield f"{_sentence(design, between)} varied between participants."
     if constant:
-        yield f"{_sentence(constant)} was the same in all trials."
+        yield f"{_sentence(design, constant)} was the same in all trials."
     hands = [name for name in by_hand(design) if len(design.factors[name].all_levels) > 1]
     if hands:
         yield f"The experimenter set {joined_by_and(hands)} by hand."
@@ -68,7 +68,7 @@ def _factors(design: DesignConfig) -> Iterator[str]:
 
 def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
     if isinstance(table, PairingConfig):
-        items = _sentence([(name, design.factors[name]) for name in table.of])
+        items = _sentence(design, [(name, design.factors[name]) for name in table.of])
         yield f"{items} was compared in pairs. The pair was chosen after each answer, {pairing_words(table)}."
         return
     levels = [tuple(float(level) for level in design.factors[name].all_levels) for name in table.of]
@@ -81,11 +81,18 @@ def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
     yield f"{text[0].upper() + text[1:]} {was} chosen after each answer, {rule_words(table, levels)}."
 
 
-def _sentence(named: Sequence[tuple[str, FactorConfig]]) -> str:
-    levels = (", ".join(factor.label(level) for level in factor.all_levels) for _, factor in named)
-    told = [f"{factor_words(name)} ({some})" for (name, _), some in zip(named, levels, strict=True)]
-    text = joined_by_and(told)
+def _sentence(design: DesignConfig, named: Sequence[tuple[str, FactorConfig]]) -> str:
+    text = joined_by_and([f"{factor_words(name)} ({_levels(design, factor)})" for name, factor in named])
     return text[0].upper() + text[1:]
+
+
+def _levels(design: DesignConfig, factor: FactorConfig) -> str:
+    """The levels; of a nested factor those that each level of the outer one has."""
+    if factor.within is None:
+        return ", ".join(map(factor.label, factor.all_levels))
+    outer = design.factors[factor.within]
+    inner = [(outer.label(level), factor.levels_within(level)) for level in outer.all_levels]
+    return "; ".join(f"{label}: {', '.join(map(factor.label, some)) or 'none'}" for label, some in inner)
 
 
 def factor_words(name: str) -> str:
