@@ -90,7 +90,7 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
         ({"method": STRONG, "tension_V": {"levels": [1.0]}}, "factors.tension_V: the gun has no such number"),
         (
             {"method": {"levels": ["vibration"]}, "voltage_V": {"levels": [12.0]}},
-            "is a vibration, which has no voltage_V",
+            "is a vibration, which has no voltage_V: take it out of factors.method, or make a method of each level",
         ),
         (
             {"method": {"levels": ["vibration"]}, "peak_m_s2": {"levels": [100.0, 200.0]}},

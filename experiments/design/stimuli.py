@@ -213,8 +213,8 @@ def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], metho
     if isinstance(parameters, VibrationParameters):
         factor = next(iter(numbers.values()))[0]
         raise ConfigError(
-            f"factors.{factor}: method {method!r} is a vibration, which has no {next(iter(numbers))}; nest the factor: "
-            'within = "method"'
+            f"factors.{factor}: method {method!r} is a vibration, which has no {next(iter(numbers))}: take it out of "
+            f"factors.method, or make a method of each level in the gun's file, and no factor {factor}"
         )
     for key, (name, value) in numbers.items():
         try:
