@@ -14,7 +14,9 @@ from analysis.report.serial import as_json
 from device.parameters import GunParameters, VibrationParameters
 from device.physics import simulate
 from experiments.config.door import ConfigError
-from experiments.load import shipped_folder
+from experiments.design.planning import practice_of
+from experiments.load import load_setup, shipped_folder
+from experiments.synthetic.answers import synthetic_participant_of
 from tests.designs import SHIPPED, path_of
 
 
@@ -124,6 +126,25 @@ def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_what_synthetic_people_do_in_a_practice_without_instructions_is_given_for_something(tmp_path):
+    """Of `by` with the instruction a practice has the method alone: without a value nobody could practise."""
+    practised = '[practice]\nrepetitions = 1\nof = ["method"]\n\n[questions.response]'
+    methods = ('["vibration", "asymmetric-1", "asymmetric-2"]', '["asymmetric-1"]')
+    path = written(
+        tmp_path, "hurry", ("[questions.response]", practised), methods, ('"synthetic/hurry-felt.toml"', '"own.toml"')
+    )
+    told = 'share = { "asymmetric-1/speed" = 0.6, "asymmetric-1/accuracy" = 0.8'
+    laws = f'[questions.response]\nlaw = "rates"\nby = ["method", "instruction"]\n{told}'
+    (tmp_path / "own.toml").write_text(laws + ', "asymmetric-1" = 0.7 }\n')
+    assert not [one for one in check(path, None, 1).warnings if "nobody meets that" in one]
+    (tmp_path / "own.toml").write_text(laws + " }\n")
+    setup = load_setup(path)
+    plan = practice_of(setup.config, "P01", 1)
+    with pytest.raises(ConfigError, match="a trial without one instruction, such as one of a practice"):
+        synthetic_participant_of(setup, plan).answer(plan.trials[0], "response")
+
+
 @pytest.mark.slow
 def test_the_comparison_being_right_on_both_sides_of_the_standard_is_a_warning(tmp_path):
     """Asked for the stronger shot, everybody who feels it would be wrong wherever the standard is the stronger one."""

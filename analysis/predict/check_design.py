@@ -31,7 +31,7 @@ from experiments.design.planned import (
     trial_text,
     warnings,
 )
-from experiments.design.planning import groups, plan_of, square_size
+from experiments.design.planning import groups, plan_of, practice_of, square_size
 from experiments.design.procedures.config import PairingConfig
 from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
 from experiments.load import check_limits, language_key
@@ -141,7 +141,9 @@ def _superfluous(setup: Setup[DesignConfig]) -> Iterator[str]:
     """What the file of the synthetic people says of nothing that there is, with its line."""
     if isinstance(setup.laws, SyntheticAnswers):
         people, design = setup.source.parent / str(setup.config.synthetic), setup.config
-        yield from (at_key(people, one) for one in superfluous(design, setup.laws, plans_of_groups(design)))
+        practised = range(len(groups(design))) if design.practice.repetitions else ()
+        plans = (*plans_of_groups(design), *(practice_of(design, "P", 0, group=group) for group in practised))
+        yield from (at_key(people, one) for one in superfluous(design, setup.laws, plans))
 
 
 def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]:

@@ -275,7 +275,7 @@ def check_laws(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Pla
 
 
 def superfluous(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Plan]) -> Iterator[str]:
-    """The cells and levels that a law has a value for, and nobody meets. `plans`: one of each group."""
+    """The cells and levels that a law has a value for, and nobody meets. `plans`: one of each group, with practices."""
     met = list(dict.fromkeys(trial.levels for plan in plans for trial in plan.trials))
     for name, law in laws.questions.items():
         for place in ("share", "mean", "worth"):
@@ -413,6 +413,7 @@ def of_condition(values: Mapping[str, OfCell], by: Sequence[str], levels: Condit
     cell = cell_of(by, levels)
     if cell not in values:
         lacking = [name for name in by if name not in dict(levels)]
-        why = f": so is called a trial without one {' or '.join(lacking)}, such as a catch trial" if lacking else ""
+        such = "one of a practice" if INSTRUCTION_FACTOR in lacking else "a catch trial"
+        why = f": so is called a trial without one {' or '.join(lacking)}, such as {such}" if lacking else ""
         raise ConfigError(f"{where} has no value for {cell!r}{why}; it has {', '.join(values)}")
     return values[cell]
