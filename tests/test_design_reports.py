@@ -206,18 +206,23 @@ def test_the_axis_of_a_rating_says_its_scale_where_that_is_short(ends, shown, tm
     assert drawn[0].axes[0].get_ylabel() == shown
 
 
-def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("labels", "kick", "buzz"), [({}, "kick", "buzz"), ({"kick": "a hard kick"}, "a hard kick", "buzz")]
+)
+def test_the_share_of_an_unscored_choice_is_said_to_be_that_of_its_first_answer(
+    labels, kick, buzz, tmp_path, monkeypatch
+):
     factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
-    asked = {"kind": "choice", "text": "?", "answers": ["kick", "buzz"]}
+    asked = {"kind": "choice", "text": "?", "answers": ["kick", "buzz"], "labels": labels}
     table = pd.DataFrame({"participant_id": ["P1", "P1", "P2", "P2"], "method": "a", "voltage_V": [6.0, 10.0] * 2})
     found = summarise(design(factors=factors, questions={"feel": asked}), table.assign(feel=["kick", "buzz"] * 2))
     drawn = []
     monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
     figure_design(found, tmp_path / "figure")
-    assert drawn[0].axes[0].get_ylabel() == "share of kick [%]"
+    assert drawn[0].axes[0].get_ylabel() == f"share of {kick} [%]"
     (section, *_) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
-    assert "Drawn is the share of kick (feel)." in section.pictures[0].caption
-    assert "Share of kick" in section.tables[0].header
+    assert f"Drawn is the share of {kick} (feel)." in section.pictures[0].caption
+    assert {f"Share of {kick}", kick, buzz} <= {*section.tables[0].header}
 
 
 def test_whiskers_of_numbers_are_said_to_be_of_their_logarithms():

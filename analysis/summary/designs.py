@@ -143,6 +143,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         scale=_scale(question),
         held=_is_held(design, question),
         not_above_0=_not_above_0(question, table[name]),
+        called=question.labels,
     )
 
 

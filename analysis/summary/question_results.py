@@ -68,7 +68,8 @@ class QuestionSummary:
     functions over a numeric factor, where an answer can be a success. `pairs`: scores of compared pairs.
     `speed_accuracy`: of a question with two answers of which one is right; its `methods` are the conditions.
     `held`: its share of successes is where a procedure held it, which chose the levels by the answers. `not_above_0`:
-    how many numbers have no logarithm, and so stand in no mean; `None` without any.
+    how many numbers have no logarithm, and so stand in no mean; `None` without any. `called`: what answers are called
+    where that is not their code.
     """
 
     kind: str
@@ -83,6 +84,11 @@ class QuestionSummary:
     speed_accuracy: SpeedAccuracy | NoSpeedAccuracy | None = field(default=None, metadata=OPTIONAL)
     held: bool = field(default=False, metadata=UNWRITTEN)
     not_above_0: int | None = field(default=None, metadata=OPTIONAL)
+    called: Mapping[str, str] = field(default_factory=dict, metadata=UNWRITTEN)
+
+    def label(self, answer: str) -> str:
+        """What an answer was called."""
+        return self.called.get(answer, answer)
 
     @property
     def pictured(self) -> tuple[ConditionSummary, ...]:

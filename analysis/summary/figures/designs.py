@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
+from analysis.report.figures.glyphs import is_drawable
 from analysis.report.figures.style import (
     MANY_METHODS,
     drawn,
@@ -205,7 +206,9 @@ def _numbered(value: float) -> str:
 def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
     scored = any(cell.right is not None for cell in question.cells)
     of = "hits" if question.detected else "right" if scored else "chosen"
-    share = f"share of {drawn_name(question.counted)} [%]" if question.counted else f"{of} [%]"
+    counted = question.counted or ""
+    label = question.label(counted)
+    share = f"share of {drawn_name(label if is_drawable(label) else counted)} [%]" if counted else f"{of} [%]"
     axes.set_ylabel(share if question.kind in ("choice", "yes-no") else _with_scale(name, question))
     axes.set_xlabel(factor_words(factor) if factor else "")
     axes.set_title(name, loc="left", fontweight="bold", parse_math=False)

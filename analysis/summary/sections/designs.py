@@ -114,7 +114,7 @@ def _mean_word(question: QuestionSummary) -> str:
     if question.preferred:
         return f"chosen, in the mean over people{_tie(question)}"
     words = {"number": "geometric means", "ranking": "mean ranks"}
-    return f"share of {question.counted}" if question.counted else words.get(question.kind, "means")
+    return f"share of {question.label(question.counted)}" if question.counted else words.get(question.kind, "means")
 
 
 def _tie(question: QuestionSummary) -> str:
@@ -267,7 +267,9 @@ def _picture(name: str, found: DesignSummary) -> Picture:
 def _drawn_words(question: QuestionSummary) -> str:
     """What a picture's marks count, where its axis does not say it; else empty."""
     tie = _tie(question)
-    return f"the share of {question.counted}" if question.counted else f"how often each was chosen{tie}" if tie else ""
+    if question.counted:
+        return f"the share of {question.label(question.counted)}"
+    return f"how often each was chosen{tie}" if tie else ""
 
 
 def _whiskers(shown: Sequence[QuestionSummary], people: int) -> str:
@@ -359,11 +361,12 @@ def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> T
         )
         for cell in question.cells
     )
-    first = f"Share of {question.counted}" if question.counted else "Chosen"
+    first = f"Share of {question.label(question.counted)}" if question.counted else "Chosen"
     mean = {"number": "Geometric mean", "choice": first, "yes-no": first}.get(question.kind, "Mean")
     right = "Hits (of catch trials: correct rejections)" if question.detected else "Right"
     kind = ["Trials were"] if caught else []
-    header = (*map(factor_words, factors), *kind, "People", "Trials", *answers, right if scored else mean, *last)
+    named = (*map(factor_words, factors), *kind, "People", "Trials", *map(question.label, answers))
+    header = (*named, right if scored else mean, *last)
     return Table(caption=f"{name} by condition", header=header, rows=rows)
 
 
