@@ -21,6 +21,7 @@ from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
+from analysis.summary.sections.manuscript import manuscript_section
 from tests import figure_files
 from tests.designs import design
 
@@ -129,6 +130,10 @@ def test_numbers_have_an_exponent_over_each_numeric_factor_also_beside_others():
     (said,) = result_sentences("test", found)
     ends = f"[{test.ci_low:.2f}, {test.ci_high:.2f}]"
     assert f"Power-law exponent over pulse in s: M = {test.statistic:.2f}, 95 % CI {ends}; against 0 p = " in said
+    assert " ANOVA of natural logarithms: " in said
+    (quoted, *_) = manuscript_section(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
+    (results,) = [one for one in quoted.quotes if ", results. " in one]
+    assert results.startswith(f"{found.title}, results. Q (4 participants): geometric means")
     assert "power law over pulse_s, tested against 0" in next(sentences_of_tests(config))
 
 

@@ -135,7 +135,7 @@ def _tests_words(found: DesignSummary, question: QuestionSummary, *, exact: bool
     yield from (f"No test of {effect_words(test.effect)}: {test.reason}." for test in planned if _is_none(test))
     anovas = [_anova_words(test, exact=exact) for test in planned if test.name == "anova" and not _is_none(test)]
     if anovas:
-        yield f"ANOVA: {'; '.join(anovas)}."
+        yield f"ANOVA{' of natural logarithms' if question.kind == 'number' else ''}: {'; '.join(anovas)}."
     yield from (_ranks_words(test, exact=exact) for test in planned if test.name == "friedman" and not test.reason)
     pairs = [test for test in planned if test.name == "tukey"]
     if len(pairs) > _TOLD:

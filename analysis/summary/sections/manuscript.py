@@ -173,7 +173,9 @@ def _of_design(report: ReportData, name: str, found: DesignSummary) -> Iterator[
         for asked, question in found.questions.items()
         if question.left_out
     )
-    yield f"{found.title}, results. {' '.join([*result_sentences(name, found, exact=True), *lacking])}"
+    title = f"{found.title.rstrip('.?!')}, "  # which the paragraph begins with
+    told = (one.removeprefix(title) for one in result_sentences(name, found, exact=True))
+    yield f"{found.title}, results. {' '.join([*(one[0].upper() + one[1:] for one in told), *lacking])}"
 
 
 def _software(statistics: StudyStatistics) -> str:
