@@ -218,6 +218,8 @@ weights.x = { vibration = -1.0, asymmetric-1 = 1.0 }
     assert result[0].estimate == pytest.approx((rows["on"] - rows["off"]).mean())
     model: Any = mixed.result
     assert [one.name for one in model.coefficients] == ["intercept", "on", "voltage_V", "on:voltage_V"]
+    assert "what stands of a factor alone is its effect at the first level of the other" in mixed.note
+    assert "at 0, which may lie far from all levels" not in logistic.note  # no interaction
     model = logistic.result
     assert [one.name for one in model.coefficients] == ["intercept", "voltage_V", "backward"]
     assert grip.note.endswith("Scores: participants' means of ratings, people of all groups together.")

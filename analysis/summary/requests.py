@@ -295,8 +295,15 @@ def _factor_columns(name: str, data: RequestData) -> dict[str, FloatArray]:
 
 
 def _references(terms: tuple[str, ...], data: RequestData) -> str:
-    """What words are compared with."""
-    return "".join(f" Levels of {name} are compared with {first}." for name, first in _first_levels(terms, data))
+    """What words are compared with, and where a factor's own coefficients are beside an interaction."""
+    compared = "".join(f" Levels of {name} are compared with {first}." for name, first in _first_levels(terms, data))
+    return f"{compared}{_ALONE if any(':' in term for term in terms) else ''}"
+
+
+_ALONE = (
+    " Beside their interaction, what stands of a factor alone is its effect at the first level of the other, and where "
+    "that is a number, at 0, which may lie far from all levels."
+)
 
 
 def _first_levels(terms: tuple[str, ...], data: RequestData) -> Iterator[tuple[str, str]]:
