@@ -400,6 +400,7 @@ def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -
     rows = [
         {"participant_id": "A", "method": "asymmetric-1", "track": track, "voltage_V": level, "direction": "forward"}
         | {"response": "forward" if right else "backward", "correct": right}
+        | {"flags": "repeated at-edge" if level > 13 else "at-edges" if level < 11 else float("nan")}
         for track, level, right in told * 4
     ]
     summary = summarise(config, pd.DataFrame(rows))
@@ -408,6 +409,8 @@ def test_a_procedures_tracks_are_told_level_by_level_and_drawn(tmp_path: Path) -
     first, second = found.tracks
     assert (first.track, first.levels[:3], first.successes[:3]) == (1, (12.0, 10.0, 11.0), (True, False, True))
     assert (second.track, second.levels[:2], second.successes[:2]) == (2, (12.0, 14.0), (False, True))
+    (section,) = threshold_sections("threshold", summary)
+    assert "4 of 20 trials had a level at an end of those that there were" in section.paragraphs[-1]
     figure_tracks(summary, found, tmp_path / "tracks")
     assert (tmp_path / "tracks.png").stat().st_size > 5000
 

@@ -31,6 +31,7 @@ from analysis.summary.tracks import TrackAnswers, tracks_in
 from experiments.design.config import DesignConfig
 from experiments.design.language import INTERVAL_NAMES, YES, Level, QuestionConfig, shown_level
 from experiments.design.procedures.config import PosteriorConfig
+from experiments.record.tables import AT_EDGE
 from experiments.tasks.questions import chance, correct_columns
 
 MOST_FITTED, MOST_FITS = 40, 60
@@ -69,7 +70,7 @@ class Thresholds:
     `share`: of what, right answers, yes, or the level chosen over the standard. `standard`: what levels were compared
     with. `guess`: chance where the design knows it. Of the `people` so many were `fitted`. `even`: trials whose two
     intervals had the same level. `tracks`: of a procedure that chose the levels from the answers; `own_priors`: its
-    priors of width and lapse rate are the fit's.
+    priors of width and lapse rate are the fit's. `at_edge`: trials of them whose level was the last that there is.
     """
 
     factor: str
@@ -85,6 +86,7 @@ class Thresholds:
     differences: tuple[ConditionDifference, ...] = ()
     reason: str | None = None
     tracks: tuple[TrackAnswers, ...] = field(default=(), repr=False, metadata=UNWRITTEN)
+    at_edge: int = field(default=0, metadata=UNWRITTEN)
 
     @property
     def told_from(self) -> float | None:
@@ -113,8 +115,10 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     rows = in_design_order(design, conditions, table).assign(level=level, success=success)
     answers = LevelledAnswers(rows=rows, conditions=conditions, design=design)
     tracks = tuple(tracks_in(design, list(answers.conditions), answers.with_level))
+    at_edge = sum(AT_EDGE in str(flags).split() for flags in answers.with_level.get("flags", ())) if tracks else 0
     falls = False if design.adapted or share == "chosen" else None  # low levels follow right answers: no sign of a fall
-    return fitted_thresholds(answers, replace(found, even=even, tracks=tracks), falls=falls, everybody=everybody)
+    of_trials = replace(found, even=even, tracks=tracks, at_edge=at_edge)
+    return fitted_thresholds(answers, of_trials, falls=falls, everybody=everybody)
 
 
 def in_design_order(design: DesignConfig, names: Sequence[str], table: pd.DataFrame) -> pd.DataFrame:

@@ -92,7 +92,7 @@ def _section(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Sec
         return Section(title=title, paragraphs=(f"None was fitted: {of.reason}.",))
     return Section(
         title=title,
-        paragraphs=(_what(of), *_who(of), *_without(of), *_below_zero(of)),
+        paragraphs=(_what(of), *_who(of), *_without(of), *_below_zero(of), *_at_edge(of)),
         pictures=(_picture(name, asked, found, of), *_picture_of_tracks(name, asked, found, of)),
         tables=tuple(_tables(asked, found, of)),
     )
@@ -160,6 +160,16 @@ def _below_zero(of: Thresholds) -> Iterator[str]:
             f"{below} interval{'s' * (below > 1)} of the {_measure(of)} reach{'es' * (below == 1)} below 0, where no "
             "level is: the answers do not tell the lower end there, the prior does, which begins half the levels' span "
             "below the lowest. More trials at low levels would tell."
+        )
+
+
+def _at_edge(of: Thresholds) -> Iterator[str]:
+    """What tracks say that came to the end of the levels."""
+    if of.at_edge:
+        trials = sum(len(track.levels) for track in of.tracks)
+        yield (
+            f"{of.at_edge:,} of {how_many(trials, 'trial')} had a level at an end of those that there were, beyond "
+            "which the procedure may have gone (flag at-edge): if that is often, the levels end too soon."
         )
 
 
