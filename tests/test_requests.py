@@ -136,6 +136,35 @@ def test_every_answer_has_its_section_with_its_numbers(answers: dict[str, Reques
     assert "BF10" in found["Requested: Bayes factor, direction"].paragraphs[0]
 
 
+def test_what_is_said_of_right_answers_is_in_percentage_points_as_in_the_other_tables(
+    tmp_path: Path, logs: Logs, answers: dict[str, Requested]
+) -> None:
+    text = """
+[[requests]]
+kind = "equivalence"
+of = "direction"
+a = "asymmetric-2"
+b = "vibration"
+low = -0.055
+high = 0.1
+[[requests]]
+kind = "mixed-model"
+of = "direction"
+"""
+    given = (answers["contrasts"], *asked(tmp_path, text, logs), answers["equivalence"])
+    said = [*requested_sections(ReportData(title="x", statistics=StudyStatistics(requested=given)))]
+    contrasts, equivalence, mixed = (one.tables[0] for one in said[:3])
+    assert all("of direction in percentage points" in one.caption for one in (contrasts, equivalence))
+    result: Any = given[0].result
+    assert contrasts.rows[0][1] == f"{100 * result[0].estimate:.1f}"
+    assert equivalence.rows[0][1] == "[−5.5, 10.0]"
+    assert "lies between −5.5 and 10 percentage points, by" in said[1].paragraphs[0]
+    model: Any = given[2].result
+    assert mixed.rows[0][3] == f"{100 * model.coefficients[0].se:.1f}"
+    assert f"of single trials {100 * model.residual_sd:.1f} in percentage points" in said[2].paragraphs[0]
+    assert "percentage points" not in str(said[3])
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [
@@ -264,7 +293,7 @@ def test_the_command_answers_in_report_and_statistics_and_writes_nothing_of_what
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "out" / "statistics.json").read_text(encoding="utf-8"))["requested"]
     assert [one["kind"] for one in found] == [one.kind for one in load(Requests, EXAMPLE).requests]
-    assert set(found[0]) == {"kind", "of", "question", "people", "note", "result"}
+    assert set(found[0]) == {"kind", "of", "question", "people", "shares", "note", "result"}
     assert "Requested: planned contrasts, direction" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     (tmp_path / "bad.toml").write_text('[[requests]]\nkind = "anova"\nof = "direction"\n', encoding="utf-8")
     bad = recoil("analyze", folder, "--out", tmp_path / "none", "--requests", tmp_path / "bad.toml")

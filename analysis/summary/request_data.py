@@ -108,7 +108,8 @@ def _of_experiment(name: str, table: pd.DataFrame, called: MethodNames) -> Reque
     )
     scores = trials.pivot_table(index="participant_id", columns="method", values="score").reindex(columns=methods)
     names = RequestNames(conditions=tuple(methods), factors={METHOD_FACTOR: tuple(methods)})
-    return RequestData(scores=scores, trials=trials, unit=measure.unit, names=names)
+    shares = measure.scale == (0.0, 1.0)
+    return RequestData(scores=scores, trials=trials, unit=measure.unit, shares=shares, names=names)
 
 
 def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> RequestData:
@@ -119,6 +120,7 @@ def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> 
         scores=found.people.set_axis([*conditions], axis=1),
         trials=found.real,
         unit=_unit(design.questions[name]),
+        shares=design.questions[name].kind in {"choice", "yes-no"},
         names=RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between)),
     )
 

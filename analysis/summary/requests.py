@@ -95,12 +95,16 @@ class Requests(Model):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requested:
-    """The answer to one request: from how many people, what was done in words, and the result."""
+    """The answer to one request: from how many people, what was done in words, and the result.
+
+    `shares`: scores are shares of answers, 0 to 1, which a report shows in percentage points.
+    """
 
     kind: RequestKind
     of: str
     question: str | None
     people: int
+    shares: bool
     note: str
     result: AnyResult
 
@@ -122,12 +126,13 @@ class RequestData:
     """What requests are answered from.
 
     `scores`: participants by conditions, no cell empty; `trials`: a row a trial, with `participant_id`, `score` and the
-    factors. `unit`: what a score is.
+    factors. `unit`: what a score is; `shares`: those are shares of answers, 0 to 1.
     """
 
     scores: pd.DataFrame
     trials: pd.DataFrame
     unit: str
+    shares: bool
     names: RequestNames
 
 
@@ -183,6 +188,7 @@ def answer_to(request: AnyRequest, data: RequestData) -> Requested:
         of=request.of,
         question=request.question,
         people=data.trials["participant_id"].nunique() if of_trials else len(data.scores),
+        shares=data.shares,
         note=f"{note} {said}.",
         result=result,
     )
@@ -201,9 +207,10 @@ def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, A
     _table(data)
     first, bounds = _column(data, request.a), (request.low, request.high, request.alpha)
     what = request.a if request.b is None else f"{request.a} − {request.b}"
-    shown = " and ".join(f"{bound:g}".replace("-", "−") for bound in bounds[:2])
+    scale, unit = (100.0, " percentage points") if data.shares else (1.0, "")
+    shown = " and ".join(f"{scale * bound:g}".replace("-", "−") for bound in bounds[:2])
     note = (
-        f"Whether the mean of {what} lies between {shown}, by two one-sided t-tests (TOST, Schuirmann 1987), "
+        f"Whether the mean of {what} lies between {shown}{unit}, by two one-sided t-tests (TOST, Schuirmann 1987), "
         f"α = {request.alpha:g}: one test that it is above the lower bound, one that it is below the upper. p is the "
         "larger of the two."
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from analysis.report import apa
 from analysis.report.labels import named
@@ -20,7 +20,29 @@ from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.supplement import bayes_cell
 from device.words import how_many
 
-_DIGITS = 3
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Printed:
+    """How scores, their differences and what a model says of them are printed: so many times what is stored."""
+
+    scale: float
+    digits: int
+    unit: str
+
+    def number(self, value: float | None) -> str:
+        return apa.number(None if value is None else self.scale * value, self.digits)
+
+    def interval(self, one: PlannedContrast | Equivalence | Coefficient) -> str:
+        return f"[{self.number(one.ci_low)}, {self.number(one.ci_high)}]"
+
+
+_AS_STORED = _Printed(scale=1.0, digits=3, unit="")
+_IN_POINTS = _Printed(scale=100.0, digits=1, unit=" in percentage points")
+
+
+def _printed(one: Requested) -> _Printed:
+    """Shares are printed as the rest of the report prints them; log odds are none."""
+    return _IN_POINTS if one.shares and one.kind != "logistic" else _AS_STORED
 
 
 def requested_sections(report: ReportData) -> Iterator[Section]:
@@ -49,7 +71,7 @@ def _data(one: Requested) -> str:
 
 def _told(one: Requested) -> str:
     """What is not in a table: a Bayes factor, how people differ, or why there is no result."""
-    result = one.result
+    result, printed = one.result, _printed(one)
     if isinstance(result, tuple):
         return ""
     if result.reason is not None:
@@ -59,18 +81,21 @@ def _told(one: Requested) -> str:
             factor = bayes_cell(result.bf10)
             return f"BF10 {factor}." if factor[0] in "<>" else f"BF10 = {factor}."
         case LinearMixedModel():
-            spread = f"SD between people {_number(result.person_sd)}, of single trials {_number(result.residual_sd)}"
+            number, unit = printed.number, printed.unit
+            spread = (
+                f"SD between people {number(result.person_sd)}, of single trials {number(result.residual_sd)}{unit}"
+            )
             return f"{spread}; {how_many(result.trials, 'trial')}."
         case RandomInterceptLogit():
-            return f"SD of people's log odds {_number(result.person_sd)}; {how_many(result.trials, 'trial')}."
+            return f"SD of people's log odds {printed.number(result.person_sd)}; {how_many(result.trials, 'trial')}."
         case Equivalence():
-            return _equivalence_words(result)
+            return _equivalence_words(result, printed)
 
 
-def _equivalence_words(found: Equivalence) -> str:
+def _equivalence_words(found: Equivalence, printed: _Printed) -> str:
     """What the two tests say: an absence of proof is no proof of a difference."""
     level = apa.number(100.0 * (1.0 - 2.0 * found.alpha), 0)
-    told = f"The mean was {_number(found.difference)}, {level} % CI {_interval(found)}"
+    told = f"The mean was {printed.number(found.difference)}, {level} % CI {printed.interval(found)}{printed.unit}"
     p = apa.p_value(found.p)
     if found.p is not None and found.p < found.alpha:
         return f"{told}, which lies within the bounds: equivalence was shown, {p}."
@@ -90,27 +115,29 @@ def _outside(found: Equivalence) -> str | None:
 
 
 def _table(one: Requested) -> Table | None:
+    printed = _printed(one)
+    of = f"{_data(one)}{printed.unit}"
     match one.result:
         case tuple():
-            return _contrasts(f"Planned contrasts of {_data(one)}", one.result)
+            return _contrasts(f"Planned contrasts of {of}", one.result, printed)
         case Equivalence(reason=None):
-            return _equivalence(f"Two one-sided tests of {_data(one)}; p is the larger of both", one.result)
+            return _equivalence(f"Two one-sided tests of {of}; p is the larger of both", one.result, printed)
         case LinearMixedModel(reason=None):
-            return _coefficients(f"Fixed effects on {_data(one)}", one.result.coefficients)
+            return _coefficients(f"Fixed effects on {of}", one.result.coefficients, printed)
         case RandomInterceptLogit(reason=None, coefficients=found):
-            return _with_odds(_coefficients(f"Fixed effects on the log odds of {_data(one)}", found), found)
+            return _with_odds(_coefficients(f"Fixed effects on the log odds of {of}", found, printed), found)
     return None
 
 
-def _contrasts(caption: str, found: Sequence[PlannedContrast]) -> Table:
+def _contrasts(caption: str, found: Sequence[PlannedContrast], printed: _Printed) -> Table:
     return Table(
         caption=caption,
         header=("Contrast", "Estimate", "95 % CI", "t", "df", "p", "p corrected", "d_z"),
         rows=tuple(
             (
                 one.name if one.reason is None else f"{one.name}. {one.reason}",
-                _number(one.estimate),
-                _interval(one),
+                printed.number(one.estimate),
+                printed.interval(one),
                 apa.number(one.t),
                 str(one.df),
                 apa.p_cell(one.p),
@@ -122,16 +149,16 @@ def _contrasts(caption: str, found: Sequence[PlannedContrast]) -> Table:
     )
 
 
-def _equivalence(caption: str, found: Equivalence) -> Table:
+def _equivalence(caption: str, found: Equivalence, printed: _Printed) -> Table:
     level = apa.number(100.0 * (1.0 - 2.0 * found.alpha), 0)
     return Table(
         caption=caption,
         header=("Difference", "Bounds", f"{level} % CI", "t, low", "t, high", "df", "p"),
         rows=(
             (
-                _number(found.difference),
-                apa.interval(found.low, found.high, _DIGITS),
-                _interval(found),
+                printed.number(found.difference),
+                f"[{printed.number(found.low)}, {printed.number(found.high)}]",
+                printed.interval(found),
                 apa.number(found.t_low),
                 apa.number(found.t_high),
                 f"{found.df:g}",
@@ -141,16 +168,16 @@ def _equivalence(caption: str, found: Equivalence) -> Table:
     )
 
 
-def _coefficients(caption: str, found: Sequence[Coefficient]) -> Table:
+def _coefficients(caption: str, found: Sequence[Coefficient], printed: _Printed) -> Table:
     return Table(
         caption=caption,
         header=("Coefficient", "Estimate", "95 % CI", "SE", "z", "p"),
         rows=tuple(
             (
                 named(one.name),
-                _number(one.estimate),
-                _interval(one),
-                _number(one.se),
+                printed.number(one.estimate),
+                printed.interval(one),
+                printed.number(one.se),
                 apa.number(one.z),
                 apa.p_cell(one.p),
             )
@@ -164,11 +191,3 @@ def _with_odds(table: Table, found: Sequence[Coefficient]) -> Table:
     odds = tuple(apa.odds_cell(math.exp(min(one.estimate, 700.0))) for one in found)
     rows = tuple((*row, cell) for row, cell in zip(table.rows, odds, strict=True))
     return replace(table, header=(*table.header, "Odds ratio"), rows=rows)
-
-
-def _number(value: float | None) -> str:
-    return apa.number(value, _DIGITS)
-
-
-def _interval(one: PlannedContrast | Equivalence | Coefficient) -> str:
-    return apa.interval(one.ci_low, one.ci_high, _DIGITS)
