@@ -19,7 +19,7 @@ from analysis.predict.check import check, check_text
 from analysis.summary.analyze import Request, analyze, result_files
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
-from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations
+from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations, frozen_tests
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.preregistration import deviations_sections
@@ -450,6 +450,29 @@ def test_who_finished_and_was_not_given_to_the_analysis_is_named(study: Path) ->
     for paths in (folders, tables):
         ((found,), _) = deviations(read_logs(paths), used)
         assert found.deviations == ()
+    journals[3].write_text("garbage\n")
+    ((found,), _) = deviations(read_logs(folders[:3]), used)
+    (one,) = of_kind(found, "run")
+    assert one.what.startswith("run of preference, not given to this analysis: there is no journal that can be read")
+    assert one.who == ("P04",)
+
+
+@pytest.mark.slow
+def test_where_the_results_are_a_link_to_another_disk_the_freeze_is_the_one_beside_the_link(
+    study: Path, tmp_path: Path
+) -> None:
+    of_preference_alone(study, 2)
+    do(study, "P01")
+    elsewhere = tmp_path / "disk" / "of-pilot"
+    elsewhere.parent.mkdir()
+    (study / "results").rename(elsewhere)
+    (study / "results").symlink_to(elsewhere)
+    assert [(one.what, one.instead) for one in told(study).deviations] == [("participants who finished preference", 1)]
+    assert frozen_tests(read_logs([study / "results"])) == [TEST | {"of": "preference"}]
+    (tmp_path / "shortcut").symlink_to(elsewhere)  # beside which no study lies
+    (elsewhere.parent / "preregistration-1.json").write_bytes((study / "preregistration-1.json").read_bytes())
+    ((found,), _) = deviations(read_logs([tmp_path / "shortcut"]), AnalysisFiles())
+    assert [one.number for one in found.preregistrations] == [1]
 
 
 TEST = {"kind": "bayes-factor", "of": "direction", "scale": 0.5}

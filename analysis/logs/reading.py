@@ -30,6 +30,7 @@ from analysis.logs.files import (
     experiment_in_name,
     find_logs,
     read_content,
+    results_above,
     study_names,
 )
 from analysis.logs.journals import (
@@ -50,6 +51,7 @@ from analysis.logs.texts import TextTable, joined, table_of_records, text_tables
 from experiments.record import tables
 from experiments.record.tables import DataKind
 from experiments.study.folders import PlaceError
+from experiments.study.preregistration import study_folder
 from experiments.study.study import Member
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
@@ -106,6 +108,12 @@ class Logs:
         names = set(self.names.values())
         apart = len(names) > 1 or (names and study not in self.names)
         return f"{self.names.get(study, Path(study).name)}/{code}" if apart else code
+
+    def folder_of(self, results: str) -> Path:
+        """The folder of a study: that beside its results as they were given, which may be a link to another disk."""
+        given = {results_above(str(Path(path).absolute())) for path in (*self.paths, *(run.path for run in self.runs))}
+        links = (folder for folder in sorted(given - {results}) if os.path.realpath(folder) == results)
+        return study_folder(Path(next(links, results)), Path(results))
 
     mapped: bool = False
     """Whether some come from other programs, read by a map: they say of no plan."""

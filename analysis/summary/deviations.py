@@ -103,7 +103,7 @@ def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, 
             said += looked.stand.problems
             one = _of_study(looked, used)
             found.append(one)
-            said += _not_made(Path(results).parent, one)
+            said += _not_made(looked.chain.folder, one)
     return tuple(found), tuple(said)
 
 
@@ -132,7 +132,7 @@ class _Looked:
 
     `blank`: runs that were killed before anything was acknowledged; `unread`: those whose journal cannot be read.
     `strangers`: of which experiment who else has a run, as synthetic participants beside people. `elsewhere`: runs that
-    lie in the study's results and were not given to the analysis.
+    lie in the study's results and were not given to the analysis; `unread_elsewhere` as `unread`.
     """
 
     results: Path
@@ -144,13 +144,15 @@ class _Looked:
     unread: tuple[RunFile, ...]
     strangers: frozenset[tuple[str, str]]
     elsewhere: tuple[_Run, ...]
+    unread_elsewhere: tuple[RunFile, ...]
 
     @classmethod
     def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
         """`None` of a study that was never frozen, and of an archive, which has not what it is held against."""
-        if (results.parent / ARCHIVE_FILE).exists():
+        folder = logs.folder_of(str(results))
+        if (folder / ARCHIVE_FILE).exists():
             return None
-        chain = read_chain(results.parent)
+        chain = read_chain(folder)
         if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
             return None
         given = _given(results, logs, runs)
@@ -158,16 +160,19 @@ class _Looked:
         began = [one for _, one in read if isinstance(one, _Run)]
         carried = [(one.head.plan.participant_id, one.head.preregistration_sha256) for one in began]
         mine = [one for one in began if logs.kind == "synthetic" or one.head.participant == "person"]
+        whose = "synthetic" if logs.kind == "synthetic" else "person"
+        others = [(run, _read(run)) for run in _not_given(results, logs, given)]
         return cls(
             results=results,
             logs=logs,
-            stand=freeze_status(results.parent, carried),
+            stand=freeze_status(folder, carried),
             registered=read_register(results),
             runs=tuple(sorted(mine, key=lambda one: one.head.utc)),
             blank=tuple(run for run, one in read if one == "blank"),
             unread=tuple(run for run, one in read if one == "unread"),
             strangers=frozenset((one.code, one.file.experiment) for one in began if one not in mine),
-            elsewhere=tuple(_not_given(results, logs, given)),
+            elsewhere=tuple(one for _, one in others if isinstance(one, _Run) and one.head.participant == whose),
+            unread_elsewhere=tuple(run for run, one in others if one == "unread"),
         )
 
     @property
@@ -199,15 +204,11 @@ def _given(results: Path, logs: Logs, runs: Iterable[RunFile]) -> dict[str, RunF
     return found
 
 
-def _not_given(results: Path, logs: Logs, given: Collection[str]) -> Iterator[_Run]:
-    """The runs of people, or in a rehearsal those of synthetic participants, that it does not know."""
-    whose = "synthetic" if logs.kind == "synthetic" else "person"
+def _not_given(results: Path, logs: Logs, given: Collection[str]) -> Sequence[RunFile]:
+    """The runs that it does not know."""
     known = {*given, *(_place(journal_of(str(problem.file))) for problem in logs.problems)}
-    for path in sorted(results.glob("sub-*/sub-*_journal.jsonl")):
-        file = run_file(str(path), str(results))
-        one = None if file is None or str(path) in known else _read(file)
-        if isinstance(one, _Run) and one.head.participant == whose:
-            yield one
+    there = map(str, sorted(results.glob("sub-*/sub-*_journal.jsonl")))
+    return [file for path in there if path not in known and (file := run_file(path, str(results)))]
 
 
 def _place(path: str) -> str:
@@ -233,7 +234,7 @@ def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
         listed += [*_amended(looked.chain), *_changed(looked.stand), *_runs(looked)]
         listed += [*_participants(looked, last), *_exclusions(looked), *_analysis(last, used)]
     return StudyDeviations(
-        study=looked.logs.names.get(str(looked.results), looked.results.parent.name),
+        study=looked.logs.names.get(str(looked.results), looked.chain.folder.name),
         preregistrations=tuple(
             FrozenAs(
                 number=one.number,
@@ -285,9 +286,10 @@ def _each_difference(looked: _Looked) -> Iterator[tuple[Deviation, str]]:
     for run in looked.runs:
         if run.file.kind != "practice":
             yield from ((one, run.head.plan.participant_id) for one in _of_run(looked.chain, run.head))
-    for file in looked.unread:
-        if file.kind != "practice":
-            yield Deviation(kind="run", what=f"run of {file.experiment}: {_UNREAD}"), file.participant
+    for files, aside in ((looked.unread, ""), (looked.unread_elsewhere, ", not given to this analysis")):
+        for file in files:
+            if file.kind != "practice":
+                yield Deviation(kind="run", what=f"run of {file.experiment}{aside}: {_UNREAD}"), file.participant
 
 
 _UNREAD = (
@@ -437,8 +439,8 @@ def _requests(last: Preregistration, used: AnalysisFiles) -> Iterator[Deviation]
 
 def frozen_tests(logs: Logs) -> Sequence[JsonValue]:
     """The tests that the one study of these logs has frozen last; of several studies none."""
-    folders = [Path(results) for results in logs.names if Path(results).is_absolute()]
-    last = read_chain(folders[0].parent).last if len(folders) == 1 else None
+    folders = [logs.folder_of(results) for results in logs.names if Path(results).is_absolute()]
+    last = read_chain(folders[0]).last if len(folders) == 1 else None
     return [] if last is None else _frozen_tests(last)
 
 
