@@ -475,6 +475,25 @@ def test_where_the_results_are_a_link_to_another_disk_the_freeze_is_the_one_besi
     assert [one.number for one in found.preregistrations] == [1]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_a_design_is_found_in_the_freeze_however_the_study_names_its_file(
+    study: Path, tmp_path: Path, *, elsewhere: bool
+) -> None:
+    named = str(tmp_path / "designs" / "preference.toml") if elsewhere else "./preference.toml"
+    copytree(study, tmp_path / "designs")
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(text.replace('["direction.toml", "preference.toml"]', f'["{named}"]'))
+    (study / "requests.toml").write_text(REQUEST.replace("direction", "preference"))
+    freeze(study, "", RealClock())
+    do(study, "P01")
+    assert [(one.what, one.instead) for one in told(study).deviations] == [("participants who finished preference", 1)]
+    design = Path(os.path.normpath(study / named))
+    edited(design.parent, design.name, "fatigue.max_planned_s", "1200.0", 1300.0)
+    file = design.as_posix() if elsewhere else "preference.toml"
+    assert [(one.file, one.key) for one in freeze_status(study).changes] == [(file, "fatigue.max_planned_s")]
+
+
 TEST = {"kind": "bayes-factor", "of": "direction", "scale": 0.5}
 
 

@@ -342,7 +342,7 @@ def _version(what: str, frozen: Preregistration, now: str) -> Iterator[Deviation
 
 def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]:
     study = last.study
-    for experiment in dict.fromkeys(str(last.files[file].get("design")) for file in study.experiments):
+    for experiment in dict.fromkeys(last.designs.values()):
         done = _finished(looked, experiment)
         if len(done) != study.participants:
             yield Deviation(

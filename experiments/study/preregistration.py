@@ -93,6 +93,12 @@ class Preregistration(Model):
         """The study as it was frozen."""
         return StudyConfig.model_validate_json(json.dumps(self.files[STUDY_FILE]))
 
+    @property
+    def designs(self) -> dict[str, str]:
+        """The names of the experiments' designs by their files."""
+        files = [_place(file) for file in self.study.experiments]
+        return {file: str(self.files[file].get("design")) for file in files if file in self.files}
+
     def record(self) -> dict[str, JsonValue]:
         """What its file holds."""
         return {**self.model_dump(mode="json"), "sha256": self.sha256}
@@ -120,7 +126,11 @@ def files_now(source: Path, study: StudyConfig, setups: Sequence[Setup[DesignCon
     named = [one for one in (study.paper, own.rules, own.requests, own.codebook) if one is not None]
     return {
         STUDY_FILE: study.model_dump(mode="json"),
-        **{file: values for setup in setups for file, values in _files_of(source.parent, setup).items()},
+        **{
+            file: values
+            for name, setup in zip(study.experiments, setups, strict=True)
+            for file, values in _files_of(_place(name), setup).items()
+        },
         **{name: as_frozen(path) for name in named if (path := source.parent / name).exists()},
     }
 
@@ -142,10 +152,19 @@ def _without_reason(entry: JsonValue) -> JsonValue:
     return {key: value for key, value in entry.items() if key != "reason"} if isinstance(entry, dict) else entry
 
 
-def _files_of(folder: Path, setup: Setup[DesignConfig]) -> Files:
-    gun = setup.source.parent / setup.config.gun
-    places = [Path(os.path.relpath(path, folder)).as_posix() for path in (setup.source, gun)]
+def _files_of(file: str, setup: Setup[DesignConfig]) -> Files:
+    places = (file, _beside(file, setup.config.gun))
     return dict(zip(places, map(_values, setup.record().values()), strict=True))
+
+
+def _place(file: str | Path) -> str:
+    """A file as configs name it: beside the study, or elsewhere, on Windows on another drive too."""
+    return Path(os.path.normpath(file)).as_posix()
+
+
+def _beside(file: str, named: str) -> str:
+    """A file that another one names."""
+    return _place(Path(file).parent / named)
 
 
 def _values(found: object) -> FileValues:
@@ -198,13 +217,12 @@ def changes_of_run(frozen: Preregistration, setup: object) -> tuple[KeyChange, .
 
 def design_file(frozen: Preregistration, design: str) -> str | None:
     """The file of the study that holds a design of this name; `None`: none was frozen."""
-    experiments = frozen.study.experiments
-    return next((file for file in experiments if frozen.files.get(file, {}).get("design") == design), None)
+    return next((file for file, name in frozen.designs.items() if name == design), None)
 
 
 def gun_file(frozen: Preregistration, file: str) -> str:
     """The file of the gun that a frozen design names."""
-    return Path(os.path.normpath(Path(file).parent / str(frozen.files[file].get("gun")))).as_posix()
+    return _beside(file, str(frozen.files[file].get("gun")))
 
 
 # reading what was frozen
