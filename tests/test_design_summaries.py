@@ -61,9 +61,10 @@ def test_one_factor_within_people_is_its_anova_and_ranks():
     config, laws = loaded("preference")
     table = simulated(config, laws, 14)
     found = summarise(config, table).questions["rating"]
-    scores = table.pivot_table(index="participant_id", columns="method", values="rating").to_numpy()
+    methods = ["vibration", "asymmetric-1", "asymmetric-2"]  # in the order of the design
+    scores = table.pivot_table(index="participant_id", columns="method", values="rating")[methods].to_numpy()
     anova, friedman, *pairs = found.tests
-    by_hand = rm_tukey_hsd(scores, sorted({"vibration", "asymmetric-1", "asymmetric-2"}))
+    by_hand = rm_tukey_hsd(scores, methods)
     assert [(one.name, one.effect) for one in pairs] == [("tukey", f"{one.a} – {one.b}") for one in by_hand]
     assert [one.p for one in pairs] == [float(one.p) for one in by_hand]
     assert pairs[0].df == (3, 26)

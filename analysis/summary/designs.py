@@ -116,7 +116,7 @@ def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> Que
     column = correct_columns(design.questions).get(name, name)
     scored = table.assign(score=answer_scores(design.questions[name], table[column])).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
-    people = _complete(real, varied(design))
+    people = _complete(design, real)
     tested = real["participant_id"] if design.trial.kind == "pair" else people.index  # pairs have scores, and no tests
     left_out = sorted({*table["participant_id"].astype(str)} - {*tested.astype(str)})
     return QuestionScores(scored=scored, real=real, people=people, left_out=tuple(left_out))
@@ -187,10 +187,15 @@ def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[C
 
 def _place(design: DesignConfig, levels: Mapping[str, Level]) -> list[int]:
     """Where a condition stands: the place of each of its levels in the design."""
+    known = _known_levels(design)
+    return [some.index(levels[name]) if name in levels else len(some) for name, some in known.items()]
+
+
+def _known_levels(design: DesignConfig) -> dict[str, tuple[Level, ...]]:
+    """The levels in each column by which conditions differ."""
     compared = design.trial.compare or ""
     named = {f"{compared}_1": compared, f"{compared}_2": compared}
-    known = {name: design.factors[named.get(name, name)].all_levels for name in varied(design)}
-    return [some.index(levels[name]) if name in levels else len(some) for name, some in known.items()]
+    return {name: design.factors[named.get(name, name)].all_levels for name in varied(design)}
 
 
 def _levels(design: DesignConfig, rows: pd.DataFrame) -> dict[str, Level]:
@@ -287,12 +292,14 @@ def _with_right(cell: ConditionSummary, right: int, by_chance: float | None) -> 
     return replace(cell, right=right, p=p, ci_low=float(test.ci_low), ci_high=float(test.ci_high))
 
 
-def _complete(rows: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
-    """The mean score by condition, one row for each person who has all of them."""
-    within = [name for name in factors if rows.groupby("participant_id")[name].nunique().max() > 1]
+def _complete(design: DesignConfig, rows: pd.DataFrame) -> pd.DataFrame:
+    """The mean score by condition, in the design's order; one row for each person who has all of them."""
+    within = [name for name in varied(design) if rows.groupby("participant_id")[name].nunique().max() > 1]
     if not within:
         return rows.groupby("participant_id")[["score"]].mean()
-    return rows.pivot_table(index="participant_id", columns=within, values="score").dropna()
+    wide = rows.pivot_table(index="participant_id", columns=within, values="score").dropna()
+    known = _known_levels(design)
+    return wide.sort_index(axis="columns", key=lambda levels: levels.map(known[str(levels.name)].index))
 
 
 def _groups(design: DesignConfig, rows: pd.DataFrame) -> pd.Series | None:
