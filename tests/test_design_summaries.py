@@ -283,6 +283,27 @@ def test_nested_factors_are_described_and_not_tested():
     assert "factors that are nested, not crossed, are not tested here" in test.reason
 
 
+def test_nested_levels_have_no_exponent_and_the_report_says_why():
+    config = design(
+        factors={
+            "method": {"levels": ["a", "b"]},
+            "voltage_V": {"within": "method", "levels": {"a": [1.0, 2.0], "b": [2.0, 4.0]}},
+        },
+        questions={"q": {"kind": "number", "text": "How strong?"}},
+    )
+    rows = [
+        (person, method, voltage, voltage * strength)  # the exponent is 1 in both methods, and would be 1.5 over all
+        for person in ("P1", "P2", "P3")
+        for method, strength, voltages in (("a", 1.0, (1.0, 2.0)), ("b", 2.0, (2.0, 4.0)))
+        for voltage in voltages
+    ]
+    found = summarise(config, pd.DataFrame(rows, columns=["participant_id", "method", "voltage_V", "q"]))
+    _, exponent = found.questions["q"].tests
+    assert (exponent.name, exponent.effect, exponent.statistic) == ("exponent", "voltage_V", None)
+    (said,) = result_sentences("test", found)
+    assert "No power-law exponent over voltage in V: factors are nested, so the means over its levels can" in said
+
+
 @pytest.mark.slow
 def test_more_than_two_levels_within_people_have_the_p_that_does_not_take_sphericity():
     config, laws = loaded("realism")

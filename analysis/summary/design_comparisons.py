@@ -32,9 +32,11 @@ def condition_tests(
         return
     if why := _untested(design, question, people):
         yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
+        if question.kind == "number" and _is_nested(people):
+            yield from (DesignTest(name="exponent", effect=name, reason=_OTHERS_DIFFER) for name in _powers(people))
         return
     if question.kind == "number":
-        yield from _exponents(names, people)
+        yield from (_exponent(name, people.T.groupby(level=name).mean().T) for name in _powers(people))
     if len(names) == 1 and (group is None or question.kind == "ranking"):
         scores = people.to_numpy(dtype=np.float64)
         yield from _one_factor(names[0], scores, question)
@@ -61,9 +63,13 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
         return f"several factors between people are {instead}"
     if len(_sizes(people)) > MOST_FACTORS:
         return f"more than {MOST_FACTORS} factors within people are {instead}"
-    if math.prod(_sizes(people)) != people.shape[1]:
+    if _is_nested(people):
         return f"factors that are nested, not crossed, are {instead}"
     return "fewer than two people have all conditions" if len(people) < 2 else ""
+
+
+def _is_nested(people: pd.DataFrame) -> bool:
+    return math.prod(_sizes(people)) != people.shape[1]
 
 
 def with_levels_of_their_own(design: DesignConfig, names: Iterable[str]) -> list[str]:
@@ -164,12 +170,13 @@ def has_exponent(levels: Collection[Level]) -> bool:
     return len(levels) > 2 and all(isinstance(level, float) and level > 0 for level in levels)
 
 
-def _exponents(names: Sequence[str], people: pd.DataFrame) -> Iterator[DesignTest]:
-    """The exponent of each numeric factor within people, of the means over the levels of the others."""
-    for name in names:
-        means = people.T.groupby(level=name).mean().T
-        if has_exponent([*means.columns]):
-            yield _exponent(name, means)
+_OTHERS_DIFFER = "factors are nested, so the means over its levels can differ by the levels of the others too"
+
+
+def _powers(people: pd.DataFrame) -> list[str]:
+    """The numeric factors within people over which there is a power law."""
+    names = [str(name) for name in people.columns.names if name is not None]
+    return [name for name in names if has_exponent(people.columns.unique(name).to_list())]
 
 
 def _exponent(name: str, people: pd.DataFrame) -> DesignTest:

@@ -193,6 +193,8 @@ def _sensitivity_words(question: QuestionSummary) -> Iterator[str]:
 
 
 def _exponent_words(test: DesignTest, *, exact: bool) -> str:
+    if test.reason:
+        return f"No power-law exponent over {effect_words(test.effect)}: {test.reason}."
     told = f"{_mean_and_interval(test)}; against 0 {apa.p_value(test.p, exact=exact)}"
     return f"Power-law exponent over {effect_words(test.effect)}: {told}."
 
