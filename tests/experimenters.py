@@ -400,7 +400,7 @@ def written(contents: Contents) -> Iterator[tuple[str, Trial, Any]]:
     for step, word in history(contents):
         match word:
             case Answered():
-                kind = {"answer": "answered", "rating": "rated", "description": "described"}[what(step)]
+                kind = {"answer": "answered", "description": "described"}.get(what(step), "rated")
                 yield kind, step.trial, word.value
             case EntryCorrected():
                 yield "corrected", word.trial, word.value

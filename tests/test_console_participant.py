@@ -123,7 +123,7 @@ def rated_and_half_described(screen: AtConsole, journal: Path, trial: int) -> No
     screen.participant_shows("DescriptionPage")
     assert isinstance(records(journal)[-2]["body"]["value"], float)
     look = screen.at("describing")
-    assert look.says("Awaited: the participant's description")
+    assert look.says("Awaited: the participant's words")
     assert not any(look.active for look in screen.watch.looks()[before:])
     screen.keys.type("so")
 

@@ -238,11 +238,12 @@ def test_rating_and_description_are_awaited_from_the_participants_screen_where_t
     trial = plan_of(PREFERENCE).trials[0]
     for state, step, what in (
         (State.RATING, rate(trial), "rating"),
-        (State.DESCRIBING, describe(trial), "description"),
+        (State.RATING, replace(rate(trial), is_number=True), "number"),
+        (State.DESCRIBING, describe(trial), "words"),
     ):
         here = seen(PREFERENCE, Position(states=(state,), step=step))
         there = replace(here, about=replace(here.about, participant_rates=True))
-        awaited = f"Awaited: the participant's {what} on their own screen, or type it here."
+        awaited = f"Awaited: the participant's {what} on their own screen, or typed here."
         assert instruction(here).detail == "?"
         assert instruction(there).detail == f"?\n{awaited}"
 
@@ -495,8 +496,10 @@ def test_a_rating_is_taken_as_it_was_typed_or_not_at_all(grain: float, typed: st
 
 
 def test_what_is_no_number_or_rank_is_told_as_such_with_its_bounds_in_full() -> None:
-    any_number = replace(rate(plan_of(PREFERENCE).trials[0]), grain=0.0, minimum=0.001, maximum=LARGEST_NUMBER)
-    assert typed_rating("hard", any_number) == "Not a number: type a number from 0.001 to 1,000,000,000."
+    scale = replace(rate(plan_of(PREFERENCE).trials[0]), minimum=0.001, maximum=LARGEST_NUMBER, is_number=True)
+    for grain in (0.0, 0.001):
+        any_number = replace(scale, grain=grain)
+        assert typed_rating("hard", any_number) == "Not a number: type a number from 0.001 to 1,000,000,000."
     rank = replace(any_number, grain=1.0, minimum=1.0, maximum=8.0, distinct=True)
     assert typed_rating("9", rank) == "Not a rank: type a number from 1 to 8."
 
@@ -558,7 +561,7 @@ def test_what_comes_next_in_a_set_with_questions_after_it_ends_with_the_set(seve
     first, second, third, *_ = plan_of(several).trials
     words = replace(describe(first), question="words")
     break_s = "break of 20 s"
-    assert progress.coming(seen(several, Position(step=ask(second)))) == ["descriptions", break_s, shown_way(third)]
+    assert progress.coming(seen(several, Position(step=ask(second)))) == ["words", break_s, shown_way(third)]
     said = progress.coming(seen(several, Position(step=words)), count=4)
     assert said[:3] == ["“words”: Feedback 2 of 2", break_s, shown_way(third)]
     said = progress.coming(seen(several, Position(step=replace(words, trial=second))))

@@ -100,6 +100,14 @@ def says(screen: AtTerminal, *lines: str) -> None:
     screen.prompt(after)
 
 
+def test_a_number_with_a_grain_is_called_a_number(sitting: Sit) -> None:
+    screen = sitting(_FACTOR + _RATING.format(name="strong", when="trial").replace('"rating"', '"number"'))
+    says(screen, "", "hard", "3", "", "4")
+    said = screen.seen
+    assert "Not a number: type a number from 0 to 10." in said
+    assert "rating" not in said
+
+
 def test_a_train_can_be_followed_by_a_choice_which_has_no_time(sitting: Sit, tmp_path: Path) -> None:
     train = '[trial]\nkind = "train"\nleast_exposure_s = 0.0\n'
     asked = '[questions.liked]\nkind = "yes-no"\ntext = "Did you like it?"\n'

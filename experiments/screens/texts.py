@@ -305,7 +305,7 @@ def _with_thousands(text: str) -> float:
 
 def _number_kind(asked: Rate) -> str:
     """What a number that is asked for is called."""
-    return phrase("rank") if asked.distinct else phrase("rating") if asked.grain else phrase("number")
+    return phrase("rank") if asked.distinct else phrase("number") if asked.is_number else phrase("rating")
 
 
 def typed_rating(text: str, scale: Rate) -> float | str:

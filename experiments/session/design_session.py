@@ -262,4 +262,5 @@ def _rate(name: str, question: QuestionConfig, trial: Trial, scale: tuple[float,
         grain=grain,
         later=question.when == "block",
         may_be_skipped=question.may_be_skipped,
+        is_number=question.kind == "number",
     )

@@ -117,7 +117,7 @@ class Rate:
     """Ask for a rating of the trial's stimulus, or for a number. `question`, `text`, `later`: as in `Ask`.
 
     `grain` is 0 where any number will do. `may_be_skipped`: no answer is one. `distinct`: each trial of the set has a
-    number of its own, as ranks are.
+    number of its own, as ranks are. `is_number`: a number is asked for, no rating, also where it has a grain.
     """
 
     trial: Trial
@@ -131,6 +131,7 @@ class Rate:
     later: bool = False
     may_be_skipped: bool = True
     distinct: bool = False
+    is_number: bool = False
     kind: Literal["rate"] = "rate"
 
 
@@ -296,13 +297,18 @@ Session = Generator[Step, Outcome, None]
 
 Asking = Ask | Rate | Describe
 """A step that asks; it says as well what was entered for its trial and question, where that is looked at again."""
-What = Literal["answer", "rating", "description"]
-_WHAT: dict[type[Asking], What] = {Ask: "answer", Rate: "rating", Describe: "description"}
+What = Literal["answer", "rating", "number", "rank", "description"]
 
 
 def what(asked: Asking) -> What:
     """What kind of answer is asked for."""
-    return _WHAT[type(asked)]
+    match asked:
+        case Ask():
+            return "answer"
+        case Rate():
+            return "rank" if asked.distinct else "number" if asked.is_number else "rating"
+        case Describe():
+            return "description"
 
 
 def is_answer(asked: Asking, value: AnswerValue) -> bool:

@@ -167,8 +167,8 @@ def _rating(seen: Seen) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Rate | Describe):
         return _MOMENT
-    kind = what(step)
-    own = phrase("Awaited: the participant's {kind} on their own screen, or type it here.", kind=kind)
+    kind = phrase("words") if isinstance(step, Describe) else what(step)
+    own = phrase("Awaited: the participant's {kind} on their own screen, or typed here.", kind=kind)
     there = _asked_there(seen, own, phrase("Type here what they say.")) if seen.about.participant_rates else ""
     question = isolated(step.text)
     title, *more = (_order_told(seen, step), question) if step.later else (question,)

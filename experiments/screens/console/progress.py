@@ -90,19 +90,19 @@ def _still_asked(about: About, step: Asking) -> Iterator[str]:
         if kind == "text":
             same = trial == step.trial
             yield phrase("its “{name}”", name=name) if same else phrase("“{name}”: {ordinal}", name=name, ordinal=place)
-        elif kind in ("choice", "yes-no"):
-            yield phrase("answer: {ordinal}", ordinal=place)
         else:
-            yield phrase("rating: {ordinal}", ordinal=place)
+            called = {"rating": phrase("rating"), "number": phrase("number"), "ranking": phrase("rank")}
+            yield phrase("{kind}: {ordinal}", kind=called.get(kind, phrase("answer")), ordinal=place)
 
 
 def _asked_of_all(about: About) -> Iterator[str]:
     """What is asked about all trials of a set, once they were felt."""
-    design = about.setup.config
-    if design.judged_later and len(design.judged_later) < len(design.asked_later):
-        yield phrase("ratings and descriptions")
-    elif design.asked_later:
-        yield phrase("ratings") if design.judged_later else phrase("descriptions")
+    kinds = {about.setup.config.questions[name].kind for name in about.setup.config.asked_later}
+    judged = phrase("ratings") if kinds <= {"rating", "text"} else phrase("answers")
+    if kinds == {"text"}:
+        yield phrase("words")
+    elif kinds:
+        yield phrase("{judged} and words", judged=judged) if "text" in kinds else judged
 
 
 def _to_do(about: About, before: Trial, trial: Trial) -> list[str]:
