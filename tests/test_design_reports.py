@@ -17,11 +17,14 @@ from analysis.report.figures import style
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.figures.designs import figure_design
+from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
 from analysis.summary.sections.manuscript import manuscript_section
+from analysis.summary.sections.thresholds import threshold_sections
+from experiments.load import load_setup
 from tests import figure_files
 from tests.designs import design
 
@@ -358,3 +361,29 @@ def test_a_pair_is_called_by_its_levels_and_its_interval_has_a_unit(kind, unit, 
     assert row[5] == apa.interval(scale * test.ci_low, scale * test.ci_high, digits)
     (sentence,) = result_sentences("test", found)
     assert "Planned comparisons (Tukey's HSD): 13 V − 10 V, q = " in sentence
+
+
+@pytest.mark.slow
+def test_reversals_of_an_up_down_track_are_ringed_and_explained_and_of_other_levels_there_are_none(
+    monkeypatch, tmp_path
+):
+    config = load_setup("staircase").config  # three right answers go down; by reversal a step is 1, 0.5 and 0.25 ms
+    ms = [8, 8, 8, 7, 7, 7.5, 8, 8, 8, 7.75]  # it turns with the 5th, the 9th and the last answer
+    right = [1, 1, 1, 1, 0, 0, 1, 1, 1, 0]
+    rows = [
+        {"participant_id": "A", "method": "asymmetric-1", "track": 1, "pulse_s": level / 1000, "correct": said}
+        | {"interval": "first"}
+        for level, said in zip(ms, right, strict=True)
+    ]
+    found = summarise(config, pd.DataFrame(rows))
+    of = found.questions["interval"].thresholds
+    assert [track.reversals for track in of.tracks] == [(4, 8, 9)]
+    shown = []
+    monkeypatch.setattr(style, "save", lambda figure, _: shown.append(figure))
+    figure_tracks(found, of, tmp_path / "never")
+    marked = [one.get_offsets().tolist() for one in shown[0].axes[0].collections]
+    assert [[5, 0.007], [9, 0.008], [10, 0.00775]] in marked
+    (section,) = threshold_sections("staircase", found)
+    assert "Ringed: reversals; the threshold is fitted to all trials" in section.pictures[1].caption
+    fixed = summarise(config, pd.DataFrame(rows).assign(pulse_s=[0.002, *[0.008] * 9]))
+    assert [track.reversals for track in fixed.questions["interval"].thresholds.tracks] == [()]

@@ -32,7 +32,7 @@ _X_LABEL = "trial of the track"
 
 
 def figure_tracks(found: DesignSummary, of: Thresholds, path_stem: Path) -> None:
-    """A panel for each of the first participants: level by trial, filled where it was a success; PNG, SVG and PDF."""
+    """A panel for each of the first participants: level by trial, filled for a success, ringed where it turned."""
     people = list(dict.fromkeys(track.participant for track in of.tracks))[:MOST_TRACK_PANELS]
     conditions = list(dict.fromkeys(track.condition for track in of.tracks))
     across = min(_ACROSS, len(people))
@@ -69,6 +69,8 @@ def _draw(axes: Axes, tracks: Sequence[TrackAnswers], conditions: Sequence[Condi
         i = conditions.index(track.condition)
         colour, trials, levels = method_colour(i), np.arange(1, len(track.levels) + 1), np.array(track.levels)
         axes.plot(trials, levels, color=colour, linestyle=method_line(track.track - 1), linewidth=0.8, zorder=2.0)
+        turned = list(track.reversals)
+        axes.scatter(trials[turned], levels[turned], s=46.0, facecolor="none", edgecolors="#222222", linewidths=0.7)
         right = np.array(track.successes)
         for some, fill in ((right, colour), (~right, "white")):
             axes.scatter(

@@ -199,12 +199,14 @@ def _picture_of_tracks(name: str, asked: str, found: DesignSummary, of: Threshol
     people = len({track.participant for track in of.tracks})
     more = people - MOST_TRACK_PANELS
     rest = f" {more:,} more people have no panel." if more > 0 else ""
+    turned = any(track.reversals for track in of.tracks)
+    rings = ". Ringed: reversals; the threshold is fitted to all trials, no mean of these" if turned else ""
     ends = "; dashed, with a band: the participant's threshold and its interval" if len(of.conditions) == 1 else ""
     yield Picture(
         stem=tracks_figure_of(name, asked),
         caption=(
             f"{found.title.rstrip('.?!')}, {asked}: the levels that the answers chose, trial by trial, a panel a "
-            f"participant and a line a track. Filled: {_SUCCESS[of.share]}; empty: not{ends}.{rest}"
+            f"participant and a line a track. Filled: {_SUCCESS[of.share]}; empty: not{ends}{rings}.{rest}"
         ),
         alt=f"Levels by trial of {how_many(len(of.tracks), 'track')} of {how_many(people, 'participant')}.",
     )
