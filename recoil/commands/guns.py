@@ -28,7 +28,9 @@ SceneOption = Annotated[
 NeedsOption = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
 TraceOption = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV.")]
 PlotOption = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG, SVG and PDF.")]
-AuditOption = Annotated[bool, typer.Option("--audit", help="Where energy and momentum went.")]
+AuditOption = Annotated[
+    bool, typer.Option("--audit", help="Add the balance: where the shot's energy and momentum went.")
+]
 HandOption = Annotated[
     str | None, typer.Option(metavar="KEY=VALUE,...", help="The gun in a hand; `assumed` for the usual one.")
 ]

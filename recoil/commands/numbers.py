@@ -40,7 +40,10 @@ def reproduce(
     study: Annotated[str, typer.Option(help="Config of a study, or the name of a shipped one.")] = "study",
     observer: Annotated[
         ObserverName | None,
-        typer.Option(help="Who answers: rebuilt from the published numbers where they fit, or drawn by the configs."),
+        typer.Option(
+            help="Which simulated participants: `reconstructed` so that their logs give the published numbers back "
+            "(where the study is that paper's), or drawn at the `rates` of the configs."
+        ),
     ] = None,
     as_json: AsJsonOption = False,
 ) -> None:
