@@ -24,9 +24,9 @@ from analysis.logs.texts import Cell
 from device.words import how_many
 from experiments.design.units import long_name
 from experiments.record import tables
-from experiments.record.design_columns import HANDS, columns
+from experiments.record.design_columns import columns
 from experiments.record.shots_table import SHOTS
-from experiments.record.tables import Column, Row
+from experiments.record.tables import HANDS, Column, Row
 from experiments.study.study import Member
 
 TASKS = {

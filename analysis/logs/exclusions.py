@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,15 @@ class LeftOut:
     rule: str = ""
     remedy: str = ""
     file: str = ""
+
+
+def by_rule(people: Iterable[LeftOut]) -> list[list[LeftOut]]:
+    """The people whom one rule leaves out of an experiment, together."""
+
+    def rule(one: LeftOut) -> tuple[str, str, str]:
+        return one.experiment, one.rule, one.remedy
+
+    return [[*some] for _, some in groupby(sorted(people, key=rule), key=rule)]
 
 
 def complete_rows(table: pd.DataFrame, experiment: str, methods: Sequence[str]) -> tuple[pd.DataFrame, list[LeftOut]]:

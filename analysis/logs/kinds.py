@@ -17,8 +17,8 @@ from analysis.logs.files import BadLogError, Problem
 from analysis.logs.journals import BegunRun
 from analysis.logs.measures import MEASURES
 from analysis.logs.texts import Block, Cell, Coded
-from experiments.record.design_columns import HANDS, columns
-from experiments.record.tables import DataKind, data_kind, is_simulated
+from experiments.record.design_columns import columns
+from experiments.record.tables import HANDS, DataKind, data_kind, is_simulated
 
 OF_KIND: dict[DataKind, str] = {
     "real": "people at a gun",

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
 
-from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut
+from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut, by_rule
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
 from device.words import how_many
@@ -113,19 +112,15 @@ def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:
 
     What could not be read is told by itself.
     """
-    told = sorted((one for one in excluded if not one.file), key=_rule)
-    for (experiment, rule, remedy), some in groupby(told, key=_rule):
+    for some in by_rule(one for one in excluded if not one.file):
+        experiment, rule = some[0].experiment, some[0].rule
         people = [f"{one.participant} ({one.reason})" for one in some]
         count = how_many(len(people), "participant")
         if len(people) > _NAMED:
             people[_NAMED:] = [f"and {len(people) - _NAMED:,} more, all named in statistics.json"]
         what = f"tests of {experiment}" if rule == IN_NO_TEST else experiment
-        yield f"left out of {what}: {count} (rule: {rule}): {', '.join(people)}; {remedy}"
+        yield f"left out of {what}: {count} (rule: {rule}): {', '.join(people)}; {some[0].remedy}"
 
 
 _NAMED = 100
 """So many people are named on a line of a terminal."""
-
-
-def _rule(one: LeftOut) -> tuple[str, str, str]:
-    return one.experiment, one.rule, one.remedy

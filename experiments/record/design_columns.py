@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from experiments.design.config import DesignConfig
-from experiments.design.language import DIRECTION_FACTOR, METHOD_FACTOR, FactorConfig, QuestionConfig, shown_level
+from experiments.design.language import FactorConfig, QuestionConfig, shown_level
 from experiments.design.plan import in_interval
 from experiments.design.units import parted
 from experiments.record import tables
 from experiments.record.tables import Column
 from experiments.tasks.questions import correct_columns
-
-HANDS = ("participant", "experimenter", "synthetic")
 
 
 def columns(design: DesignConfig) -> tuple[Column, ...]:
@@ -31,7 +29,7 @@ def _places(design: DesignConfig) -> Iterator[Column]:
         yield tables.integer_column("session", "session, from 1, in order of presentation", required=True)
     yield from _factors(design, in_session)
     if design.table == "trials":
-        yield tables.integer_column("set", "set within the session, from 1", required=True)
+        yield tables.SET
     yield from _factors(design, in_set)
     yield tables.integer_column("trial", "trial within the session, from 1, in order of presentation", required=True)
     if design.adaptive is not None:
@@ -46,7 +44,7 @@ def _factors(design: DesignConfig, names: Iterable[str]) -> Iterator[Column]:
         factor, compared = design.factors[name], name == design.trial.compare
         chosen = _CHOSEN if name in design.adapted else ""
         if not (compared and design.trial.kind == "pair"):
-            what = "level that was compared" if compared else _MEANINGS.get(name, "level of this factor")
+            what = "level that was compared" if compared else tables.KNOWN_FACTORS.get(name, "level of this factor")
             yield _factor(name, name, factor, what + chosen)
         if compared:
             for place in range(1, design.trial.intervals + 1):
@@ -55,10 +53,6 @@ def _factors(design: DesignConfig, names: Iterable[str]) -> Iterator[Column]:
 
 
 _CHOSEN = ", chosen by the answers before; empty if it was not felt"
-_MEANINGS = {
-    METHOD_FACTOR: "rendering method, as the config names it",
-    DIRECTION_FACTOR: "which way the gun pointed and shot",
-}
 
 
 def _factor(name: str, column: str, factor: FactorConfig, description: str) -> Column:
@@ -82,10 +76,10 @@ def _questions(design: DesignConfig) -> Iterator[Column]:
             yield tables.seconds_column(
                 f"{name}_time_s", "time from the onset of the last stimulus to the answer; empty if there is none"
             )
-            yield tables.level_column(f"{name}_source", HANDS, "whose hand gave the answer")
+            yield tables.level_column(f"{name}_source", tables.HANDS, "whose hand gave the answer")
             yield tables.flag_column(f"{name}_time_valid", tables.TIME_VALID)
         elif question.kind != "text":
-            yield tables.level_column(f"{name}_by", HANDS, "whose hand entered it")
+            yield tables.level_column(f"{name}_by", tables.HANDS, "whose hand entered it")
 
 
 def _answer(name: str, question: QuestionConfig) -> Column:
@@ -110,12 +104,7 @@ def _answer(name: str, question: QuestionConfig) -> Column:
 
 def _presentation(design: DesignConfig) -> Iterator[Column]:
     if design.trial.kind == "train":
-        shots = "shots presented until the participant said next"
-        yield tables.integer_column("shots", shots, least=0, most=tables.MOST_OFTEN)
-        yield tables.seconds_column(
-            "exposure_s", "from the first pulse until the participant said next, at the last presentation"
-        )
-        yield tables.EARLIER_EXPOSURE
+        yield from tables.EXPOSURE
     if design.below_break_away:
         said = "what the model says of each shot of the last presentation: `home`, `no-break-away` or `rendered`"
         yield tables.text_column("status", said)

@@ -85,6 +85,11 @@ def flag_column(name: str, description: str) -> Column:
 
 PARTICIPANT = text_column("participant_id", "participant's code, letters and digits", required=True)
 _METHOD = level_column("method", (), "rendering method, as the config names it", required=True)
+_DIRECTION = level_column("direction", ("forward", "backward"), "which way the gun pointed and shot", required=True)
+KNOWN_FACTORS = {column.name: column.description for column in (_METHOD, _DIRECTION)}
+"""What the factors are that every design knows."""
+SET = integer_column("set", "set within the session, from 1", required=True)
+HANDS = ("participant", "experimenter", "synthetic")
 ATTEMPTS = integer_column(
     "attempts",
     "how often the stimulus was presented; more than 1 after a fault, pause or repeat; answers are to the last one",
@@ -136,24 +141,29 @@ AT_EDGE = "at-edge"
 """The flag of a trial whose level is the end of those that its procedure can choose."""
 TRACK_OVER = "track-over"
 """The flag of a trial that was not presented, or not again, as its track had ended by the answers before."""
-EARLIER_EXPOSURE = seconds_column(
-    "earlier_exposure_s",
-    "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if it "
-    "was not",
+EXPOSURE = (
+    integer_column("shots", "shots presented until the participant said next", least=0, most=MOST_OFTEN),
+    seconds_column("exposure_s", "from the first pulse until the participant said next, at the last presentation"),
+    seconds_column(
+        "earlier_exposure_s",
+        "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if "
+        "it was not",
+    ),
 )
+"""How long a train of shots was felt."""
 
 TRIALS: tuple[Column, ...] = (
     PARTICIPANT,
     level_column("experiment", ("direction",), "which experiment", required=True),
     integer_column("session", "block of trials with one method, 1 to 3 in order of presentation", required=True),
     _METHOD,
-    integer_column("set", "set within the session, from 1", required=True),
+    SET,
     integer_column("trial", "trial within the session, from 1", required=True),
-    level_column("direction", ("forward", "backward"), "which way the gun pointed and shot", required=True),
+    _DIRECTION,
     level_column("response", ("forward", "backward"), "which way the participant said; empty if never answered"),
     flag_column("correct", "1 if the response is the direction, 0 if not; empty without a response"),
     seconds_column("response_time_s", "time from the onset of the pulse to the answer; empty if there is none"),
-    level_column("response_source", ("participant", "experimenter", "synthetic"), "whose hand gave the answer"),
+    level_column("response_source", HANDS, "whose hand gave the answer"),
     flag_column("response_time_valid", TIME_VALID),
     *PRESENTATION,
     level_column(
@@ -175,11 +185,9 @@ RATINGS: tuple[Column, ...] = (
         least=0.0,
         most=10.0,
     ),
-    level_column("rating_by", ("participant", "experimenter", "synthetic"), "whose hand entered the rating"),
+    level_column("rating_by", HANDS, "whose hand entered the rating"),
     text_column("comment", "the participant's own words"),
-    integer_column("shots", "shots presented until the participant said next", least=0, most=MOST_OFTEN),
-    seconds_column("exposure_s", "from the first pulse until the participant said next, at the last presentation"),
-    EARLIER_EXPOSURE,
+    *EXPOSURE,
     *PRESENTATION,
 )
 

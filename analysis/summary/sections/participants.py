@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
 
 from analysis.logs.column_map import NOT_STATED
-from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut
+from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut, by_rule
 from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.report import apa
 from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table
@@ -158,7 +157,7 @@ def left_out_lines(report: ReportData) -> tuple[str, ...]:
         return below(problem, name_below(problem.file, root).parent)
 
     return (
-        *(_rule_line(report, [*some]) for _, some in groupby(sorted(people, key=_rule), key=_rule)),
+        *(_rule_line(report, some) for some in by_rule(people)),
         *(f"Left out: {told(problem)}." for problem in report.problems),
         *(f"{'Used, but' if _is_used(report, remark) else 'Also'}: {told(remark)}." for remark in report.remarks),
     )
@@ -168,10 +167,6 @@ def _is_used(report: ReportData, remark: Problem) -> bool:
     """Whether what there is to say is of logs that count: of whoever is left out, the reason stands above."""
     analysed = report.analysed.get(remark.experiment, ())
     return not remark.participant or any(code.rpartition("/")[2] == remark.participant for code in analysed)
-
-
-def _rule(entry: LeftOut) -> tuple[str, str, str]:
-    return entry.experiment, entry.rule, entry.remedy
 
 
 def _rule_line(report: ReportData, entries: list[LeftOut]) -> str:
