@@ -44,6 +44,22 @@ def test_the_lower_end_of_a_width_is_where_the_posterior_has_it() -> None:
     assert (found.width.low, found.width.median, found.width.high) == pytest.approx((1.929, 7.544, 20.65), rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("right", "trials", "exact"),
+    [
+        ([4, 4, 9, 9, 9, 10, 10], 10, (0.0314, 0.1175)),
+        ([49, 45, 54, 56, 75, 92, 97, 98, 100], 100, (0.0118, 0.0325)),
+    ],
+)
+def test_a_lapse_rates_median_and_upper_end_are_where_the_posterior_has_them(
+    right: list[int], trials: int, exact: tuple[float, float]
+) -> None:
+    """By sums over 401 thresholds, 300 widths and 400 lapse rates; between 7 places the end was 16 % too high."""
+    levels = np.linspace(4.0, 16.0, len(right))
+    found = psychometric_fit(levels, right, [trials] * len(right), guess=0.5)
+    assert (found.lapse.median, found.lapse.high) == pytest.approx(exact, rel=0.08)
+
+
 def test_a_listed_prior_is_a_density_between_its_values_and_one_value_is_known() -> None:
     """Without data to speak of, draws are those of the prior: even over the logarithm of the width, from 1 to 16."""
     widths, lapses = np.geomspace(1.0, 16.0, 33), np.linspace(0.0, 0.08, 5)

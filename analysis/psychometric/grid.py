@@ -23,11 +23,13 @@ _NODES = 512
 _KEPT = 1e-5
 """What is left out on each side of a coarse marginal when the fine grid is laid."""
 _COARSE = (18, 14, 5, 5, 5)
-_FINE = (26, 22, 7, 20, 8)
+_FINE = (26, 22, 8, 20, 8)
 """Places of each axis. Twice on the coarse grid, so that a posterior much narrower than its cells is found as well.
 
 Catch trials say much of the guess rate: between 7 places its median was off by half an SD.
 """
+_LAPSE_POWER = 1.5
+"""Cells of a lapse rate are even in its root of this degree: its density falls from near 0, and its tail is long."""
 _AT_ONCE = 30_000
 """So many shares are worked out together."""
 _NO_SPREAD = 1e-7
@@ -98,7 +100,7 @@ def posterior(counts: LevelCounts, priors: Priors, fixed: dict[str, float]) -> P
 
 
 def _axis(name: str, bounds: tuple[float, float], size: int) -> Axis:
-    """Middles of even cells; of a rate, whose density ends at its bound, the nodes of Gauss and Legendre.
+    """Middles of even cells; of guesses and overdispersion, which end at their bounds, nodes of Gauss and Legendre.
 
     Cells of a width are as its logarithm has them: near its lowest a share hangs on it most.
     """
@@ -108,6 +110,10 @@ def _axis(name: str, bounds: tuple[float, float], size: int) -> Axis:
     if name == "width" and low > 0:
         ends = np.geomspace(low, high, size + 1)
         return Axis(low=low, high=high, values=np.sqrt(ends[1:] * ends[:-1]), cells=np.diff(ends))
+    if name == "lapse":
+        roots = np.linspace(low ** (1 / _LAPSE_POWER), high ** (1 / _LAPSE_POWER), size + 1)
+        middles = (roots[1:] + roots[:-1]) / 2
+        return Axis(low=low, high=high, values=middles**_LAPSE_POWER, cells=np.diff(roots**_LAPSE_POWER))
     if name in ("threshold", "width"):
         cells = np.full(size, (high - low) / size)
         return Axis(low=low, high=high, values=low + cells * (np.arange(size) + 0.5), cells=cells)
