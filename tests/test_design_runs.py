@@ -238,12 +238,10 @@ def test_a_criterion_and_rounds_go_together(practice, said):
         changed("direction", practice=whole)
 
 
-def test_a_criterion_needs_something_that_is_right_in_the_trial():
+def test_a_criterion_needs_something_that_is_right():
     practice = {"repetitions": 1, "of": ("method",), "until_right": 0.8, "rounds": 3}
     with pytest.raises(ValueError, match=r"practice\.until_right = 0\.8: nothing is right or wrong"):
         changed("preference", practice=practice)
-    with pytest.raises(ValueError, match="is asked after the block; ask it in the trial"):
-        changed("direction", practice=practice, questions={"response": {"when": "block"}})
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, model_validator
 
 from device.parameters import GunParameters
-from device.words import Direction
+from device.words import Direction, first_few
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
 from experiments.config.findings import DESIGN_NAME, LANGUAGE_CODE
 from experiments.config.lines import LineText
@@ -388,18 +388,9 @@ def _feedback_problems(design: DesignConfig) -> Iterator[str]:
     for key, asked in told.items():
         if asked and not scored:
             yield f"{key} = true: nothing is right or wrong; give a question `correct`, or remove {key}"
-    yield from _criterion_problems(design)
-
-
-def _criterion_problems(design: DesignConfig) -> Iterator[str]:
-    if design.practice.until_right is None:
-        return
-    key = f"practice.until_right = {design.practice.until_right:g}"
-    first = next((one for one in design.questions.values() if one.correct), None)
-    if first is None:
+    if design.practice.until_right is not None and not scored:
+        key = f"practice.until_right = {design.practice.until_right:g}"
         yield f"{key}: nothing is right or wrong; give a question `correct`, or remove until_right and rounds"
-    elif first.when != "trial":
-        yield f"{key}: the first question with a right answer is asked after the block; ask it in the trial"
 
 
 def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
@@ -416,7 +407,7 @@ def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> It
         answers = question.named_answers
         levels = sorted(map(shown_level, design.factors[question.correct].all_levels))
         if not set(levels) <= set(answers):
-            shown = f"its levels {', '.join(levels)} are not all among the answers {', '.join(answers)}"
+            shown = f"its levels {first_few(levels, 9)} are not all among the answers {', '.join(answers)}"
             yield f"correct = {question.correct!r}: {shown}"
     if question.when == "block":
         yield "when = 'block': a question about remembered trials is not scored; remove `correct`"

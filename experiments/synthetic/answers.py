@@ -14,7 +14,7 @@ from statistics import NormalDist
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
-from experiments.design.language import EMPTY, NO, YES, Level, NumberScale, QuestionConfig, shown_level
+from experiments.design.language import EMPTY, INTERVAL_NAMES, NO, YES, Level, NumberScale, QuestionConfig, shown_level
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.design.stimuli import stimulus
 from experiments.design.streams import Stream
@@ -215,7 +215,7 @@ class SyntheticParticipant:
             case WorthLaw():
                 worths = [self._worth(law, level, name) for level in trial.intervals]
                 tie = law.tie * math.sqrt(math.prod(worths))
-                return question.named_answers[_drawn([*worths, *([tie] if tie else [])], draws)]
+                return _by_place(question.named_answers)[_drawn([*worths, *([tie] if tie else [])], draws)]
             case WordsLaw():
                 return law.texts[draws.below(len(law.texts))]
             case _:
@@ -341,6 +341,16 @@ def _drawn(weights: Sequence[float], draws: Stream) -> int:
         if left < 0:
             return place
     return max(place for place, weight in enumerate(weights) if weight > 0)
+
+
+def _by_place(answers: tuple[str, ...]) -> tuple[str, ...]:
+    """The answers in the order of the intervals that they choose, ties behind: by name where they say the interval.
+
+    >>> _by_place(("second", "first")), _by_place(("this", "that", "neither"))
+    (('first', 'second'), ('this', 'that', 'neither'))
+    """
+    named = INTERVAL_NAMES[:2]
+    return (*named, *(one for one in answers if one not in named)) if {*named} <= {*answers} else answers
 
 
 def _number(trial: Trial, factor: str) -> float:

@@ -240,7 +240,7 @@ def _assumed(found: DesignSummary) -> tuple[str, ...]:
 
 def _words(found: DesignSummary) -> Iterator[str]:
     for name, said in found.words.items():
-        yield f"{name}: {how_many(said, 'answer')} in words; they stand in the logs."
+        yield f"{name}: {how_many(said, 'answer')} in words; they stand in the logs." if said else f"{name}: no answer."
 
 
 def lacking_conditions(found: DesignSummary) -> Iterator[str]:
