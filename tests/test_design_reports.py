@@ -385,5 +385,6 @@ def test_reversals_of_an_up_down_track_are_ringed_and_explained_and_of_other_lev
     assert [[5, 0.007], [9, 0.008], [10, 0.00775]] in marked
     (section,) = threshold_sections("staircase", found)
     assert "Ringed: reversals; the threshold is fitted to all trials" in section.pictures[1].caption
+    assert any("`recoil power` of this design says by how much" in text for text in section.paragraphs)
     fixed = summarise(config, pd.DataFrame(rows).assign(pulse_s=[0.002, *[0.008] * 9]))
     assert [track.reversals for track in fixed.questions["interval"].thresholds.tracks] == [()]

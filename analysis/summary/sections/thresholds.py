@@ -92,7 +92,7 @@ def _section(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Sec
         return Section(title=title, paragraphs=(f"None was fitted: {of.reason}.",))
     return Section(
         title=title,
-        paragraphs=(_what(of), *_who(of), *_without(of), *_below_zero(of), *_at_edge(of)),
+        paragraphs=(_what(of), *_who(of), *_without(of), *_below_zero(of), *_at_edge(of), *_of_a_walk(of)),
         pictures=(_picture(name, asked, found, of), *_picture_of_tracks(name, asked, found, of)),
         tables=tuple(_tables(asked, found, of)),
     )
@@ -117,6 +117,16 @@ def _what(of: Thresholds) -> str:
         f"three quarters of the way{noticed}. Numbers are medians with 95 % credible intervals; the means over people "
         "and the pooled values draw people towards each other, the more the less their own answers tell."
     )
+
+
+def _of_a_walk(of: Thresholds) -> Iterator[str]:
+    """What a fit of an up-down track rests on; a posterior procedure has priors of its own."""
+    if of.tracks and not of.own_priors:
+        yield (
+            "A staircase chose the levels: nearly all trials are at the threshold and tell little of width and lapse "
+            "rate, so that the priors of these decide, and thresholds of few trials are biased. `recoil power` of this "
+            "design says by how much."
+        )
 
 
 _PRIORS = {
