@@ -10,8 +10,8 @@ the line nor this machine delays them. Each is in the journal before the next is
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, fields
+from typing import Any, Literal
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from experiments.design.plan import Trial
@@ -33,6 +33,11 @@ class Desk:
     stimuli: Stimuli
 
 
+def _reported(report: ShotReport) -> dict[str, Any]:
+    """What a record has of a gun's report: all of it but the command."""
+    return {one.name: getattr(report, one.name) for one in fields(ShotReport) if one.name != "shot"}
+
+
 class Train:
     """A stimulus of several shots: each in the journal before the next is asked for."""
 
@@ -50,15 +55,7 @@ class Train:
     def fired(self, report: ShotReport) -> None:
         """Have a shot on the disk."""
         self.shots, self._last_s = self.shots + 1, report.pulse_start_s
-        shot = steps.TrainShot(
-            shot=self.shots,
-            requested_s=report.requested_s,
-            pulse_start_s=report.pulse_start_s,
-            pulse_end_s=report.pulse_end_s,
-            home_predicted_s=report.home_predicted_s,
-            motion=report.motion,
-            timing=report.timing,
-        )
+        shot = steps.TrainShot(shot=self.shots, **_reported(report))
         self._live.journal.append("shot", body=steps.step_record(shot))
 
     def due_s(self) -> float:
@@ -346,16 +343,7 @@ class DeskGun:
         finally:
             disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
-        return steps.Fired(
-            gun=self._live.gun_name,
-            onset_utc=onset_utc,
-            requested_s=report.requested_s,
-            pulse_start_s=report.pulse_start_s,
-            pulse_end_s=report.pulse_end_s,
-            home_predicted_s=report.home_predicted_s,
-            motion=report.motion,
-            timing=report.timing,
-        )
+        return steps.Fired(gun=self._live.gun_name, onset_utc=onset_utc, **_reported(report))
 
     def _nothing(self, step: steps.FireShot, not_before_s: float | None) -> steps.Fired:
         """What is felt of no shot, in about the time that one takes. Raises as `allow_shot`."""
