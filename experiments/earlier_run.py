@@ -210,7 +210,7 @@ def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iter
 
 
 def _who(gun: Identity) -> str:
-    return f"{gun.name}, version {gun.version}"
+    return f"{gun.name} (version {gun.version})"
 
 
 def words_shown(request: RunRequest) -> tuple[dict[str, str], dict[str, str]] | None:

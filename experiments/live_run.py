@@ -114,7 +114,7 @@ class LiveRun:
         self.inbox: deque[Event] = deque()
         self.news = threading.Condition(threading.RLock())
         self.disarming: list[threading.Thread] = []
-        self.halt_unsaved = False
+        self.halt_unsaved = self.correction_unsaved = False
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
 
@@ -259,12 +259,14 @@ class LiveRun:
             self.fail(error)
 
     def fail(self, error: JournalError) -> NoReturn:
-        """Raise what went wrong with the journal; an emergency stop that is on no record is named with it."""
+        """Raise what went wrong with the journal; what people did that is on no record is named with it."""
         self.journal.catch_up()
-        if not self.halt_unsaved:
+        forgotten = [CORRECTION_UNSAVED.capitalize()] if self.correction_unsaved else []
+        if self.halt_unsaved:
+            forgotten += ["The emergency stop is not on record: note it; resumed, the run begins without a test shot"]
+        if not forgotten:
             raise error
-        forgotten = "The emergency stop is not on record: note it; resumed, the run begins without a test shot"
-        raise JournalError(f"{error}. {forgotten}") from error
+        raise JournalError(". ".join([str(error), *forgotten])) from error
 
     def allow_shot(self) -> None:
         """Nothing if a shot may be fired now. `RunStopped`, `Held`: it may not."""
@@ -343,23 +345,30 @@ class LiveRun:
             written.add_done_callback(lambda done: self._written(kept, done))
 
     def _written(self, kept: Sequence[Remark], done: Future[None]) -> None:
-        error, remark = done.exception(), kept[0]
+        error, corrected = done.exception(), isinstance(kept[0], EntryCorrected)
         if error is None:
-            for one in kept:
-                self._screen.acknowledge(None, one)
-            return
-        text = getattr(remark, "text", "")
-        gone = isinstance(error, JournalGone)  # it is where the journal is now
-        halt = isinstance(remark, Halted) and not gone
-        self.halt_unsaved = self.halt_unsaved or halt
-        lost = HALT_UNSAVED if halt else f"Not saved: “{text}”" if text else ""
-        if not gone:
-            self._take_back(kept)
-        self._screen.trouble(f"{error}. {lost}" if lost else str(error))
-        if gone:
+            self.correction_unsaved = self.correction_unsaved and not corrected
+            for remark in kept:
+                self._screen.acknowledge(None, remark)
+        elif isinstance(error, JournalGone):  # it is where the journal is now
+            self._screen.trouble(str(error))
             self.offer(events.ResultsGone(cause=str(error)))
-        elif isinstance(remark, EntryCorrected):  # what comes next may follow from it, and would from nothing on record
-            self.offer(events.ResultsGone(cause=CORRECTION_UNSAVED))
+        else:
+            self._take_back(kept)
+            self._screen.trouble(". ".join(filter(None, (str(error), self._lost(kept[0])))))
+            if corrected:  # what comes next may follow from it, and would from nothing on record
+                self.offer(events.ResultsGone(cause=CORRECTION_UNSAVED))
+
+    def _lost(self, remark: Remark) -> str:
+        """What there is to say of a remark that the disk refused."""
+        if isinstance(remark, Halted):
+            self.halt_unsaved = True
+            return HALT_UNSAVED
+        if isinstance(remark, EntryCorrected):
+            self.correction_unsaved = True
+            return CORRECTION_UNSAVED.capitalize()
+        text = getattr(remark, "text", "")
+        return f"Not saved: “{text}”" if text else ""
 
     def _take_back(self, kept: Sequence[Remark]) -> None:
         """Show nothing that the disk refused. The session has read it: a run that goes by it ends."""

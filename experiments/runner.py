@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from device import DeviceError, Gun, LimitError, Shot, ShotReport
 from experiments.design.plan import Trial
@@ -33,9 +33,13 @@ class Desk:
     stimuli: Stimuli
 
 
-def _reported(report: ShotReport) -> dict[str, Any]:
-    """What a record has of a gun's report: all of it but the command."""
-    return {one.name: getattr(report, one.name) for one in fields(ShotReport) if one.name != "shot"}
+_Recorded = TypeVar("_Recorded", steps.Fired, steps.TrainShot)
+
+
+def _recorded(kind: type[_Recorded], report: ShotReport, **more: Any) -> _Recorded:
+    """The record of a shot: all that its report says but the command, and more."""
+    said = {one.name: getattr(report, one.name) for one in fields(ShotReport) if one.name != "shot"}
+    return kind(**said, **more)
 
 
 class Train:
@@ -55,7 +59,7 @@ class Train:
     def fired(self, report: ShotReport) -> None:
         """Have a shot on the disk."""
         self.shots, self._last_s = self.shots + 1, report.pulse_start_s
-        shot = steps.TrainShot(shot=self.shots, **_reported(report))
+        shot = _recorded(steps.TrainShot, report, shot=self.shots)
         self._live.journal.append("shot", body=steps.step_record(shot))
 
     def due_s(self) -> float:
@@ -343,7 +347,7 @@ class DeskGun:
         finally:
             disarm(self._live.gun)
         self._live.stimulus_begins(report.pulse_start_s)
-        return steps.Fired(gun=self._live.gun_name, onset_utc=onset_utc, **_reported(report))
+        return _recorded(steps.Fired, report, gun=self._live.gun_name, onset_utc=onset_utc)
 
     def _nothing(self, step: steps.FireShot, not_before_s: float | None) -> steps.Fired:
         """What is felt of no shot, in about the time that one takes. Raises as `allow_shot`."""

@@ -1324,6 +1324,30 @@ def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_
     assert contents.records[-1].reason == (EMERGENCY if halted else CORRECTION_UNSAVED)
 
 
+@pytest.mark.parametrize("halted", [False, True])
+def test_a_run_that_ends_on_a_full_disk_says_that_a_correction_is_to_be_entered_anew(
+    halted: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
+        sitting.to(S.PREPARING)
+        if halted:
+            assert sitting.live.offer(events.EmergencyStop())
+            sitting.settle()
+        assert by_hand(sitting, events.Undo())
+        monkeypatch.setattr(storage, "sync", full)
+        assert sitting.live.offer(events.Correct(value="backward"))
+        wait_for(lambda: sitting.window.troubles, "it is not said")
+        if halted:
+            assert sitting.live.offer(events.Stop(reason=EMERGENCY))
+        sitting.finish()
+    anew = ". A correction could not be saved: enter it anew (undo) when the run goes on"
+    assert isinstance(sitting.error, JournalError)
+    assert str(sitting.error).endswith(anew)
+    assert sitting.window.troubles[0].endswith(anew)
+
+
 def test_two_ranks_that_are_exchanged_are_both_written_or_neither(tmp_path: Path) -> None:
     with sat(three_ranks(), tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
         sitting.to(S.RATING)

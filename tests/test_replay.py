@@ -530,7 +530,7 @@ def test_a_run_that_goes_on_on_another_gun_says_so_and_has_it_on_record(
     sit("right", "resume", 24)
     sit("right", "resume", 32)
     journal = sit("left", "resume", 40)
-    names = ["shaker:left, version 2", "shaker:right, version 2"]
+    names = ["shaker:left (version 2)", "shaker:right (version 2)"]
     assert [one.partition(" from here on")[0] for one in told] == [
         f"The gun was {was} until now, and is {now}" for was, now in (names, names[::-1])
     ]
