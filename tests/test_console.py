@@ -171,6 +171,7 @@ def check_killed_console(configs: Path, folder: Path, display: str, seconds: flo
     journal = folder / f"{DIRECTION}_journal.jsonl"
     with AtConsole(words(configs, "direction", "--participant", "P01"), folder, display) as screen:
         screen.stands(RUN)
+        screen.ready()
         end_s = time.monotonic() + seconds
         while time.monotonic() < end_s and not (look := screen.look()).ended:
             if look.ready and look.state in ("setting", "preparing", "asking"):

@@ -179,7 +179,7 @@ def test_instructions_share_the_sets_equally_or_the_nearest_numbers_are_named():
     sets = by_place(plan_of(config, "P01", 1), sets=True)
     assert Counter(trials[0].level("instruction") for trials in sets) == {"speed": 2, "accuracy": 2}
     assert all(len(held(trials, "instruction")) == 1 for trials in sets)
-    with pytest.raises(ConfigError, match="nearest: 2 or 4"):
+    with pytest.raises(ConfigError, match="nearest: 2 or 6"):
         plan_of(design(factors=factors, order={"set": ["instruction"], "sets": 3, "repetitions": 3}), "P01", 1)
 
 
