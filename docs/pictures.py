@@ -41,9 +41,15 @@ FIGURES = {
     "design": "design --grid 20 --out OUT/design",
     "percept": "fit percept --studies 500 --out OUT/percept",
     "trade": "bench --out OUT/trade",
-    "voltages": "analyze OUT/voltages --out OUT/voltages-analysis",
 }
 """The commands whose figures the gallery shows."""
+OF_DESIGNS = {
+    "voltages": ("figure-voltages", "figure-voltages-response-functions"),
+    "hurry": ("figure-hurry-response-conditional-accuracy", "figure-hurry-response-quantile-probability"),
+}
+"""Designs, and the figures of their analysis that the gallery shows."""
+PEOPLE = 12
+"""So many synthetic participants do a design of the gallery."""
 
 
 def keep(image: Image.Image, name: str, width: int = 1280) -> None:
@@ -250,14 +256,15 @@ def languages(folder: Path, display: str) -> None:
 
 def figures(folder: Path) -> None:
     """The figures of the gallery, each by its command, and the first page of a report."""
-    codes = [f"S{number:02d}" for number in range(1, 9)]
-    for code in codes:
-        _recoil(f"run voltages --participant {code} --screen synthetic --seed 1 --results {folder}/voltages")
+    for name, stems in OF_DESIGNS.items():
+        for number in range(1, PEOPLE + 1):
+            _recoil(f"run {name} --participant S{number:02d} --screen synthetic --seed 1 --results {folder}/{name}")
+        _recoil(f"analyze {folder}/{name} --out {folder}/{name}-analysis")
+        for stem in stems:
+            keep(Image.open(folder / f"{name}-analysis" / "figures" / f"{stem}.png"), stem, 1000)
     for name, command in FIGURES.items():
         _recoil(command.replace("OUT", str(folder)))
-        drawn = sorted(folder.glob(f"{name}.png")) or sorted(
-            (folder / (f"{name}-analysis" if name == "voltages" else name) / "figures").glob("*.png")
-        )
+        drawn = sorted(folder.glob(f"{name}.png")) or sorted((folder / name / "figures").glob("*.png"))
         for number, path in enumerate(drawn, 1):
             keep(Image.open(path), f"figure-{name}{f'-{number}' if len(drawn) > 1 else ''}", 1000)
     _page(f"file://{ROOT / 'results' / 'reference' / 'report.html'}", folder / "report.png", "1100,1400")
