@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
+from contextlib import suppress
 
 import pytest
 
@@ -20,10 +21,24 @@ from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.practice_text import practice_text
 from experiments.screens.synthetic import synthetic_screen
-from experiments.session.practice_rounds import is_needed, scores
+from experiments.session.design_session import design_session
+from experiments.session.practice_rounds import RoundScore, is_needed, scores
 from experiments.session.remarks import EntryCorrected
-from experiments.session.steps import FireShot, Inform, Prepare, Rest
+from experiments.session.steps import (
+    Answered,
+    Ask,
+    Closed,
+    Fired,
+    FireShot,
+    Inform,
+    Prepare,
+    Prepared,
+    Rate,
+    Rest,
+    Rested,
+)
 from experiments.study.folders import place
+from experiments.tasks.questions import right_answer
 from recoil.config_files import copy_began_with
 from tests.designs import SHIPPED, changed, laws_of
 
@@ -212,6 +227,67 @@ def test_a_rounds_answers_count_as_they_were_corrected(tmp_path):
     assert is_needed(setup.config, finished.plan, told, 2)  # 4 of 6 are not 80 %
     told += [(None, EntryCorrected(trial=first[4], question="response", value=first[4].direction))]
     assert not is_needed(setup.config, finished.plan, told, 2)
+
+
+def driven(setup, answer, in_break=None):
+    """What a practice asks and tells, step by step, where each trial is answered so."""
+    plan, told = practice_of(setup.config, "P01", 1), []
+    session = design_session(plan, setup, told)
+    step = next(session)
+    with suppress(StopIteration):
+        while True:
+            match step:
+                case Ask() | Rate():
+                    value = answer(step.trial) if isinstance(step, Ask) else 5.0
+                    outcome = Answered(value=value, by="participant")
+                case Rest():
+                    outcome = Rested(rested_s=1.0)
+                    if in_break:
+                        in_break(told, plan)
+                case Prepare():
+                    outcome = Prepared()
+                case FireShot():
+                    outcome = Fired(
+                        gun="simulated",
+                        onset_utc="2026-01-01T00:00:00Z",
+                        requested_s=0.0,
+                        pulse_start_s=0.0,
+                        pulse_end_s=0.01,
+                        home_predicted_s=0.2,
+                        motion="home",
+                    )
+                case _:
+                    outcome = Closed()
+            told.append((step, outcome))
+            step = session.send(outcome)
+    return plan, told
+
+
+def test_a_block_is_asked_about_once_also_if_a_correction_in_the_break_ends_the_practice():
+    felt = {"kind": "rating", "when": "block", "text": "How strong?", "minimum": 0.0, "maximum": 10.0, "grain": 1.0}
+    rounds = {"repetitions": 1, "of": ("method", "direction"), "until_right": 0.8, "rounds": 3}
+    asked = {"strong": felt | {"minimum_text": "not", "maximum_text": "very"}}
+    setup = changed("direction", questions=asked, breaks={"between_sets_s": 5.0}, practice=rounds)
+
+    def all_right(told, plan):
+        right = [trial for trial in plan.trials if trial.set == 1]
+        told += [(None, EntryCorrected(trial=one, question="response", value=one.direction)) for one in right]
+
+    _, told = driven(setup, lambda trial: {"forward": "backward"}.get(trial.direction, "forward"), all_right)
+    assert Counter(step.kind for step, _ in told if isinstance(step, Ask | Rate | Rest)) == {
+        "ask": 6,
+        "rate": 6,
+        "rest": 1,
+    }
+
+
+def test_trials_in_which_nothing_is_right_keep_nobody_practising():
+    levels = {"voltage_V": {"levels": (12.0, 14.0, 16.0)}}  # the standard has 14 V
+    rounds = {"repetitions": 1, "of": ("voltage_V",), "until_right": 1.0, "rounds": 3}
+    setup = changed("stronger", factors=levels, practice=rounds)
+    question = setup.config.questions["stronger"]
+    plan, told = driven(setup, lambda trial: right_answer(setup.config, question, trial) or "first")
+    assert scores(setup.config, plan, told) == [RoundScore(2, 2)]
 
 
 def test_each_round_has_the_same_trials_in_an_order_of_its_own_and_the_first_is_as_without_rounds():

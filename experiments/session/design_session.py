@@ -55,7 +55,7 @@ def design_session(
             yield from _block_over(presenter, script, before, passed)
             yield from _rest(presenter, script.design, before, trial)
             yield from _left_over(presenter, script, passed)
-            passed = []
+            passed, before = [], None  # by a correction in the break nothing may follow, and a block is over once
         passed.append(trial)
         if (here := script.due(trial)) is not None:
             yield from presenter.present(here)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan
-from experiments.session.history import History, entered_value
+from experiments.design.plan import Plan, Trial
+from experiments.session.history import History, counting
+from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import Answered, Ask
-from experiments.tasks.questions import correct_columns, right_answer
+from experiments.tasks.questions import AnswerValue, correct_columns, right_answer
 
 
 @dataclass(frozen=True, slots=True)
 class RoundScore:
-    """How many answers of a round were right, of how many trials."""
+    """How many answers of a round were right, of how many trials in which one is."""
 
     right: int
     trials: int
@@ -27,25 +28,29 @@ class RoundScore:
         return self.right >= share * self.trials - 1e-9  # 0.7 of 10 is 7, whatever its last digit
 
 
-def round_score(design: DesignConfig, plan: Plan, told: History, number: int) -> RoundScore:
-    """The score of a round, by the design's first scored question; who gave no answer was not right."""
-    name = next(iter(correct_columns(design.questions)))
-    asked = {
-        step.trial: step
-        for step, word in told
-        if isinstance(word, Answered) and isinstance(step, Ask) and (step.trial.set, step.question) == (number, name)
-    }
-    question = design.questions[name]
-    right = sum(entered_value(told, step) == right_answer(design, question, trial) for trial, step in asked.items())
-    return RoundScore(right, sum(trial.set == number for trial in plan.trials))
-
-
 def scores(design: DesignConfig, plan: Plan, told: History) -> list[RoundScore]:
-    """The rounds that had begun when this was told, in order; none of a run, or of a practice without a criterion."""
+    """The rounds that had begun when this was told, in order, by the design's first scored question.
+
+    Who gave no answer was not right. None of a run, or of a practice without a criterion.
+    """
     if not plan.practice or design.practice.until_right is None:
         return []
-    begun = max((step.trial.set for step, _ in told if isinstance(step, Ask)), default=0)
-    return [round_score(design, plan, told, number) for number in range(1, begun + 1)]
+    name, begun = next(iter(correct_columns(design.questions))), 0
+    given: dict[Trial, AnswerValue] = {}
+    for step, word in counting(told):
+        if isinstance(step, Ask):
+            begun = max(begun, step.trial.set)
+            if step.question == name and isinstance(word, Answered):
+                given[step.trial] = word.value
+        elif isinstance(word, EntryCorrected) and word.question == name:
+            given[word.trial] = word.value
+    found = [RoundScore(0, 0)] * begun
+    for trial in plan.trials:
+        right = right_answer(design, design.questions[name], trial)
+        if right is not None and trial.set <= begun:
+            one = found[trial.set - 1]
+            found[trial.set - 1] = RoundScore(one.right + (given.get(trial) == right), one.trials + 1)
+    return found
 
 
 def is_needed(design: DesignConfig, plan: Plan, told: History, number: int) -> bool:
