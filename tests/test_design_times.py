@@ -196,6 +196,19 @@ def test_a_report_names_conditions_and_instructions_as_the_design_does(tmp_path:
     assert all((tmp_path / f"{stem}.png").is_file() for stem in stems)
 
 
+@pytest.mark.slow
+def test_levels_with_commas_and_answers_have_their_labels_too() -> None:
+    grip = {"levels": ["wet, tight", "loose"], "labels": {"wet, tight": "Firm, wet"}}
+    which = WHICH | {"labels": {"backward": "to me", "forward": "away"}}
+    order, (_, table) = {"set": ["instruction"], "sets": 2}, answered()
+    told = design(factors=FACTORS | {"grip": grip}, order=order, questions={"response": which})
+    table = table.assign(grip=table["grip"].replace("tight", "wet, tight"))
+    (details,) = trade_details(shown(told, table, fits=True))
+    fitted = [row[0] for row in cells(details, -1)]
+    assert fitted[0] == "drift Asymmetric Force II, Firm, wet"
+    assert "start (towards to me)" in fitted
+
+
 def test_a_report_without_measures_has_no_such_section() -> None:
     config, table = answered()
     found = summarise(config, table.assign(gun="real"))

@@ -92,8 +92,13 @@ def effect_words(effect: str) -> str:
 
 
 def condition_words(found: DesignSummary, condition: str, word: Callable[[str], str] = display_name) -> str:
-    """A condition, as results name it, with each level by what that is called; else in words, as an effect."""
-    return ", ".join(_part_words(found, part, word) for part in condition.split(", "))
+    """A condition, as results name it, with each level by what that is called; else in words, as an effect.
+
+    A level may have commas of its own: a part begins with a factor.
+    """
+    factors = "|".join(map(re.escape, found.factors))
+    parts = re.split(rf", (?=(?:{factors})(?:_[12])? )", condition)
+    return ", ".join(_part_words(found, part, word) for part in parts)
 
 
 def _part_words(found: DesignSummary, part: str, word: Callable[[str], str]) -> str:

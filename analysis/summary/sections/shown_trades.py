@@ -58,7 +58,7 @@ def _of_design(name: str, design: DesignSummary, word: Callable[[str], str]) -> 
                 of=f"{design.title or name.capitalize()}, {asked}",
                 people=how_many(design.n, "synthetic participant" if design.origin.synthetic else "participant"),
                 synthetic=design.origin.synthetic,
-                first=next(iter(question.cells[0].answers or ()), "") if question.cells else "",
+                first=next((question.label(one) for cell in question.cells[:1] for one in cell.answers or ()), ""),
                 names=_names_of_design(design, trade, word),
                 stems=(f"figure-{name}-{asked}-conditional-accuracy", f"figure-{name}-{asked}-quantile-probability"),
             )
