@@ -126,7 +126,6 @@ def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_what_synthetic_people_do_in_a_practice_without_instructions_is_given_for_something(tmp_path):
     """Of `by` with the instruction a practice has the method alone: without a value nobody could practise."""
     practised = '[practice]\nrepetitions = 1\nof = ["method"]\n\n[questions.response]'
