@@ -178,7 +178,11 @@ def test_no_log_at_all_is_said(tmp_path: Path, recoil: Recoil) -> None:
 
 
 @pytest.mark.slow
-def test_of_another_design_it_is_said_who_fits_it(tmp_path: Path, recoil: Recoil) -> None:
+def test_of_another_design_it_is_said_who_fits_it_if_anybody_does(tmp_path: Path, recoil: Recoil) -> None:
+    recoil("run", "magnitude", "--participant", "S1", "--screen", "synthetic", "--seed", "1", "--results", "logs")
+    done = recoil("fit", "times", "logs", "--out", "out")
+    assert "no usable log of experiment 1" in done.stderr
+    assert "analyze --fits" not in done.stderr
     recoil("run", "hurry", "--participant", "S1", "--screen", "synthetic", "--seed", "1", "--results", "logs")
     done = recoil("fit", "times", "logs", "--out", "out")
     assert done.returncode == 2

@@ -38,20 +38,27 @@ def _timed(found: DesignSummary, logs: DesignLogs, *, fits: bool) -> DesignSumma
     return replace(found, questions=timed)
 
 
+def has_times(design: DesignConfig, name: str) -> bool:
+    """Whether speed and accuracy of a question are measured: it has two answers of which one is right.
+
+    Not of catch trials, of compared pairs, and where a procedure held the accuracy.
+    """
+    question = design.questions[name]
+    chosen = question.kind == "choice" and question.correct is not None and len(question.answers) == len(DIRECTIONS)
+    return chosen and not (design.adapted or design.trial.kind == "pair" or design.trial.catch)
+
+
 def question_times(
     design: DesignConfig, name: str, table: pd.DataFrame, *, fits: bool
 ) -> SpeedAccuracy | NoSpeedAccuracy | None:
-    """The measures of a question with two answers of which one is right; `None` for any other.
-
-    Nor are there any of catch trials, of compared pairs, and where a procedure held the accuracy.
+    """The measures of a question that `has_times`; `None` of any other.
 
     A condition stands for experiment 1's method: whatever varied but the answer that is right, and the instruction, of
     which each has cells of its own.
     """
-    question = design.questions[name]
-    chosen = question.kind == "choice" and question.correct is not None and len(question.answers) == len(DIRECTIONS)
-    if not chosen or design.adapted or design.trial.kind == "pair" or "stimulus" in table:
+    if not has_times(design, name):
         return None
+    question = design.questions[name]
     factors = [factor for factor in varied(design) if factor not in (INSTRUCTION, question.correct)]
     correct = pd.to_numeric(table[correct_columns(design.questions)[name]])
     first = (table[name] == question.answers[0]) == (correct == 1)  # where neither was given, nobody looks

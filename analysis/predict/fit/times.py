@@ -25,6 +25,7 @@ from analysis.report.section import PageHead, PageNotice, Picture, Section, Tabl
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress
 from analysis.stats.arrays import FloatArray
+from analysis.summary.design_times import has_times
 from analysis.summary.summary import METHOD_ORDER
 from analysis.times.fit import EDGE, AnsweredBy, DiffusionFit, Estimate, answered_by, fit, profile
 from analysis.times.likelihood import LapseRange, Trials
@@ -136,7 +137,8 @@ def _own(paths: Sequence[Path], logs: Logs) -> OwnTrials:
     where = ", ".join(map(str, paths))
     if not len(logs.trials):
         reasons = [str(one) for one in (*logs.problems, *logs.begun)]
-        others = ", ".join(one.design.design for one in logs.designs)
+        designs = [one.design for one in logs.designs]
+        others = ", ".join(one.design for one in designs if any(has_times(one, name) for name in one.questions))
         instead = f"; of other designs ({others}) `recoil analyze --fits` fits the model" if others else ""
         raise PlaceError("\n".join([f"no usable log of experiment 1 in {where}{instead}", *reasons]))
     names = logs.methods.and_then(MethodNames(order=METHOD_ORDER))
