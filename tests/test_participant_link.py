@@ -6,12 +6,13 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
 
-from experiments.screens.participant.link import ParticipantError, ParticipantLink
+from experiments.screens.participant.link import Mailbox, ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import (
     AskChoice,
     AskDescription,
@@ -199,6 +200,15 @@ def test_a_screen_that_stands_still_while_nothing_is_asked_is_ended_and_told(chi
     assert told == ["the participant's screen stood still for 1 s and was ended"]
     link.close()
     assert len(told) == 1
+
+
+def test_of_two_threads_that_find_the_screen_gone_one_tells_of_it():
+    """That which reads its words, and that which waits for its beats."""
+    mail = Mailbox()
+    with ThreadPoolExecutor() as threads:
+        first = [*threads.map(mail.fail, ["it ended", "it stood still"])]
+    assert sorted(first) == [False, True]
+    assert mail.failure == ("it ended" if first[0] else "it stood still")
 
 
 @pytest.mark.slow

@@ -274,8 +274,7 @@ class ParticipantLink:
 
     def _failed(self, why: str) -> None:
         """Nothing comes from there any more; the first reason stands, and is told once."""
-        first = self._mail.failure is None
-        self._mail.fail(why)
+        first = self._mail.fail(why)
         self._beats.put(0.0)
         if first:
             self._gone(why)
@@ -324,11 +323,13 @@ class Mailbox:
         """Whether a question is open."""
         return self._open is not None
 
-    def fail(self, message: str) -> None:
-        """Nothing comes any more; the first reason stands."""
+    def fail(self, message: str) -> bool:
+        """Nothing comes any more; the first reason stands. Whether this is it."""
         with self._news:
-            self.failure = self.failure or message
+            first = self.failure is None
+            self.failure = message if first else self.failure
             self._news.notify_all()
+            return first
 
     def open_ask(self) -> int:
         """The number of a new question."""
