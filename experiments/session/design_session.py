@@ -49,19 +49,19 @@ def design_session(
         for opening in setup.config.opening:
             yield from presenter.until_done(Inform(text=opening.text, what=opening.kind))
     before: Trial | None = None
+    block: Trial | None = None
     passed: list[Trial] = []
     for trial in plan.trials:
         if before is not None and not of_one_set(before, trial) and script.due(trial):
-            yield from _block_over(presenter, script, before, passed)
+            yield from _block_over(presenter, script, block, passed)
             yield from _rest(presenter, script.design, before, trial)
             yield from _left_over(presenter, script, passed)
-            passed, before = [], None  # by a correction in the break nothing may follow, and a block is over once
+            passed, block = [], None  # by a correction in the break nothing may follow in this set
         passed.append(trial)
         if (here := script.due(trial)) is not None:
             yield from presenter.present(here)
-            before = here
-    if before is not None:
-        yield from _block_over(presenter, script, before, passed)
+            before = block = here
+    yield from _block_over(presenter, script, block, passed)
     yield from presenter.close()
     while script.left(passed):  # by a correction at the end a track is not over
         yield from _left_over(presenter, script, passed)
@@ -74,10 +74,13 @@ def _left_over(presenter: Presenter, script: _Script, passed: Sequence[Trial]) -
         yield from presenter.present(trial)
 
 
-def _block_over(presenter: Presenter, script: _Script, last: Trial, passed: Sequence[Trial]) -> Session:
-    """The trials that are left, and what is asked about each of a set, in order of presentation, once all were felt."""
+def _block_over(presenter: Presenter, script: _Script, last: Trial | None, passed: Sequence[Trial]) -> Session:
+    """The trials that are left, and what is asked about each of a set, in order of presentation, once all were felt.
+
+    `last`: a trial of that set; `None` if nothing was felt since a block was asked about.
+    """
     yield from _left_over(presenter, script, passed)
-    for trial in script.plan.set_of(last):
+    for trial in script.plan.set_of(last) if last is not None else ():
         for step in script.questions(trial, when="block"):
             yield from presenter.until_done(step)
 
