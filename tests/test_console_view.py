@@ -35,7 +35,7 @@ from experiments.session.steps import Answered, Asking, Interrupted, Prepare, Pr
 from experiments.tasks.questions import choices_of
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
-from tests.designs import direction_with
+from tests.designs import changed, direction_with
 
 SAID = Answered(value="forward", by="experimenter", response_time_s=1.0, response_time_valid=False)
 RATED = replace(SAID, value=2.0)
@@ -95,6 +95,21 @@ def test_a_correction_names_its_question_where_several_of_its_kind_are_asked() -
     told = ((first, RATED), (other, RATED))
     assert instruction(seen(PREFERENCE, corrected, *told)).title == "Correct the rating “rating”"
     assert instruction(seen(PREFERENCE, replace(corrected, correcting=other), *told)).title.endswith("“realism”")
+
+
+@pytest.mark.parametrize("reached", [True, False])
+def test_a_practice_in_rounds_says_at_its_end_whether_the_run_comes_next(*, reached: bool) -> None:
+    rounds = {"repetitions": 1, "of": ("method", "direction"), "until_right": 0.8, "rounds": 2}
+    setup = changed("direction", practice=rounds)
+    plan = planning.practice_of(setup.config, "P01", 1)
+    right = [trial.direction for trial in plan.trials[:6]]
+    said = right if reached else [{"forward": "backward"}.get(one, "forward") for one in right]
+    told = tuple((ask(trial), replace(SAID, value=one)) for trial, one in zip(plan.trials, said, strict=False))
+    about = About(setup=setup, plan=plan, band="PRACTICE", last="The run itself comes next.")
+    at_the_end = Seen(about=about, position=Position(states=(State.CLOSING,)), told=told)
+    for here in (at_the_end, replace(at_the_end, ended=Ended(reason=None))):
+        assert ("That was not reached: explain the task again" in instruction(here).detail) is not reached
+    assert ("The run itself comes next." in instruction(here).detail) is reached
 
 
 # what is never told

@@ -25,6 +25,12 @@ def practice_text(design: DesignConfig, plan: Plan, told: History, *, over: bool
         trials=last.trials,
         share=f"{100.0 * wanted:g}",
     )
-    if not over or last.reaches(wanted):
+    if not (over and is_to_be_repeated(design, plan, told)):
         return said
     return phrase("{said} That was not reached: explain the task again, then practise anew.", said=said)
+
+
+def is_to_be_repeated(design: DesignConfig, plan: Plan, told: History) -> bool:
+    """Whether a practice that is over has not reached what was wanted."""
+    wanted, rounds = design.practice.until_right, scores(design, plan, told)
+    return wanted is not None and bool(rounds) and not rounds[-1].reaches(wanted)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from experiments.live_run import HALT_UNSAVED
 from experiments.screens import texts
 from experiments.screens.console.keys import is_on_buttons
-from experiments.screens.console.view import About, Ended, Seen, method_text
+from experiments.screens.console.view import Ended, Seen, method_text
 from experiments.screens.phrases import isolated, phrase
-from experiments.screens.practice_text import practice_text
+from experiments.screens.practice_text import is_to_be_repeated, practice_text
 from experiments.session.history import entered_value
 from experiments.session.states import State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Prepare, Present, Rate, Rest, what
@@ -35,7 +35,7 @@ class Instruction:
 def instruction(seen: Seen) -> Instruction:
     """What to do now."""
     if seen.ended is not None:
-        return _end(seen.about, seen.ended)
+        return _end(seen, seen.ended)
     if seen.position.state in (State.SETTING, State.PREPARING) and (trouble := seen.gun_trouble):
         return _see_to_the_gun(trouble)
     shown = _OF_STATE.get(seen.position.state, _MOMENT)
@@ -51,7 +51,8 @@ def _see_to_the_gun(trouble: str) -> Instruction:
     return Instruction(title=phrase("See to the gun first"), detail=detail, mood="bad")
 
 
-def _end(about: About, ended: Ended) -> Instruction:
+def _end(seen: Seen, ended: Ended) -> Instruction:
+    about = seen.about
     kept = ended.saved if not about.band else None  # of a practice or training nothing is gone on with
     safe = (
         ""
@@ -60,7 +61,9 @@ def _end(about: About, ended: Ended) -> Instruction:
     )
     close = phrase("Q closes this window.")
     if ended.reason is None:
-        return Instruction(title=phrase("Finished"), detail=f"{safe}{about.last}\n{close}", mood="good")
+        again = is_to_be_repeated(about.setup.config, about.plan, seen.told)
+        last = _practised(seen, over=True) if again else about.last  # the run itself does not come next
+        return Instruction(title=phrase("Finished"), detail=f"{safe}{last}\n{close}", mood="good")
     resumed = "" if kept is None else phrase("{safe}The run can be resumed.", safe=safe)
     detail = "\n".join(filter(None, (_sentence(ended.reason), resumed, close)))
     return Instruction(title=phrase("Stopped"), detail=detail, mood="bad")
