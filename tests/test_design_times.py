@@ -134,6 +134,29 @@ def test_the_results_say_in_a_sentence_what_haste_gave() -> None:
     assert f"Told “In haste” instead of “accuracy” (paired by participant, n = 5): {told}" in said
 
 
+def test_the_mean_over_conditions_is_of_those_that_a_person_meets_where_a_factor_varies_between_people() -> None:
+    """No person holds the gun both ways: asked for all conditions, nobody had a mean, and nothing was said of it."""
+    config, table = answered(people=6)
+    grip = {**FACTORS, "grip": {**FACTORS["grip"], "between": True}}
+    config = design(factors=grip, order={"set": ["instruction"], "sets": 2}, questions={"response": WHICH})
+    table = table[(table["grip"] == "tight") == table["participant_id"].isin(["P0", "P1", "P2"])]
+    lost = (table["participant_id"] == "P0") & (table["method"] == "asymmetric-1")
+    found = measured(config, table[~lost])  # who lacks a condition of their own group has no mean
+    over = next(one for one in found.instruction_effects if one.method is None)
+    own = table[table["participant_id"] != "P0"].groupby(["participant_id", "method", "grip", "instruction"])
+    own = own["response_time_s"].mean().groupby(["participant_id", "instruction"]).mean().unstack()
+    assert (over.mean_s.people, over.mean_s.mean) == (5, pytest.approx((own["speed"] - own["accuracy"]).mean()))
+    cells = [(name, cell) for name, by_told in found.methods.items() for cell in by_told.values()]
+    assert {(name, cell.balanced_integration.people) for name, cell in cells} == {
+        (name, 2 if "tight" in name else 3) for name in found.methods
+    }
+    scores = [cell.balanced_integration for _, cell in cells]
+    assert sum((one.mean or 0.0) * one.people for one in scores) == pytest.approx(0.0, abs=1e-9)
+    assert "Told “In haste” instead of “accuracy” (paired by participant, n = 6)" in "".join(
+        result_sentences("test", shown(config, table).statistics.designs["test"])
+    )
+
+
 def test_the_first_answer_is_where_the_start_leans_to() -> None:
     """Somebody who says "backward" sooner than "forward", and the first answer is that."""
     config, table = answered(people=2, repetitions=20)

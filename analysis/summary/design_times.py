@@ -72,7 +72,8 @@ def question_times(
         "response_time_valid": table[f"{name}_time_valid"],
         **({INSTRUCTION: table[INSTRUCTION]} if INSTRUCTION in table else {}),
     }
-    return speed_accuracy(pd.DataFrame(columns), conditions, fits=fits)
+    between = [place for place, factor in enumerate(factors) if factor in design.between]
+    return speed_accuracy(pd.DataFrame(columns), conditions, groups=_groups(conditions, between), fits=fits)
 
 
 def _conditions(design: DesignConfig, factors: list[str], table: pd.DataFrame) -> tuple[pd.Series, list[str]]:
@@ -84,3 +85,12 @@ def _conditions(design: DesignConfig, factors: list[str], table: pd.DataFrame) -
         rows = rows + f"{', ' if place else ''}{factor} " + table[factor].map(shown_level).astype(str)
     found = set(rows.unique())
     return rows.astype("category"), [one for one in named if one in found]
+
+
+def _groups(conditions: list[str], between: list[int]) -> list[list[str]]:
+    """The conditions that the same people meet: alike in the parts, by their places, that vary between people."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for condition in conditions:
+        parts = condition.split(", ")
+        found.setdefault(tuple(parts[place] for place in between), []).append(condition)
+    return [*found.values()]

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from analysis.stats.arrays import FloatArray
+from analysis.stats.arrays import FloatArray, IndexArray
 from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, Estimate, fit
 from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
@@ -199,17 +199,28 @@ def defined(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
+def over_methods(values: FloatArray, groups: Sequence[IndexArray]) -> FloatArray:
+    """Each person's mean over the methods of their group, NaN for who lacks one of these; values (people, methods).
+
+    `groups`: the places of methods that the same people meet.
+    """
+    means = np.stack([values[:, group].mean(axis=1) for group in groups])
+    own = np.isfinite(means)
+    return np.where(own.any(axis=0), means[own.argmax(axis=0), np.arange(len(values))], np.nan)
+
+
 def instruction_effects(
-    cells: PersonCells, methods: Sequence[str], instructions: Sequence[str]
+    cells: PersonCells, methods: Sequence[str], instructions: Sequence[str], groups: Sequence[IndexArray]
 ) -> Iterator[InstructionEffect]:
-    """Every pair of instructions, over all methods and for each; people who had both, under all methods alike.
+    """Every pair of instructions, over all methods and for each; people who had both, under all methods of their group.
 
     The mean over methods weighs them alike, whatever the number of trials. Student's t on people - 1 degrees of
     freedom; nothing is corrected for the number of pairs.
     """
     for a, b in combinations(range(len(instructions)), 2):
         rate, mean_s = (v[:, :, a] - v[:, :, b] for v in (cells.rate, cells.mean_s))
-        columns: list[_Columns] = [(None, rate.mean(axis=1), mean_s.mean(axis=1))] if len(methods) > 1 else []
+        together = over_methods(rate, groups), over_methods(mean_s, groups)
+        columns: list[_Columns] = [(None, *together)] if len(methods) > 1 else []
         columns += [(method, rate[:, i], mean_s[:, i]) for i, method in enumerate(methods)]
         for method, by_rate, by_time in columns:
             yield InstructionEffect(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.stats.arrays import FloatArray
+from analysis.stats.arrays import FloatArray, IndexArray
 from analysis.times.fit import DiffusionFit
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import (
@@ -192,11 +192,12 @@ class SpeedAccuracy(_UsedTrials):
 
 
 def speed_accuracy(
-    trials: pd.DataFrame, methods: Sequence[str], *, fits: bool = False
+    trials: pd.DataFrame, methods: Sequence[str], *, groups: Sequence[Sequence[str]] = (), fits: bool = False
 ) -> SpeedAccuracy | NoSpeedAccuracy:
     """Measures of speed and accuracy over times of the answerer's own hand alone, if there are some.
 
-    `trials` is a coded table; `fits`: with the diffusion model fitted.
+    `trials` is a coded table; `groups`: of the methods, those that the same people meet, all unless given; `fits`:
+    with the diffusion model fitted.
     """
     own = own_trials(trials, methods)
     n, people = int(own.time_s.size), int(np.unique(own.person).size)
@@ -212,6 +213,7 @@ def speed_accuracy(
             methods={},
         )
     cells = person_cells(own)
+    places = [np.array([methods.index(one) for one in group]) for group in groups or [methods]]
     return SpeedAccuracy(
         n=n,
         people=people,
@@ -220,16 +222,16 @@ def speed_accuracy(
         reason=None,
         instructions=own.instructions,
         quantiles=QUANTILES,
-        methods=_methods(own, cells),
-        instruction_effects=tuple(instruction_effects(cells, own.methods, own.instructions)),
+        methods=_methods(own, cells, places),
+        instruction_effects=tuple(instruction_effects(cells, own.methods, own.instructions, places)),
         diffusion=_diffusion(sampled_fit(own)) if fits else _not_fitted(n, people),
         caveats=CAVEATS,
     )
 
 
-def _methods(own: OwnTrials, cells: PersonCells) -> dict[str, dict[str, CellTrade]]:
+def _methods(own: OwnTrials, cells: PersonCells, groups: Sequence[IndexArray]) -> dict[str, dict[str, CellTrade]]:
     """The measures of each method and instruction that has trials."""
-    efficiency, balanced = _inverse_efficiency(cells), _balanced_integration(cells)
+    efficiency, balanced = _inverse_efficiency(cells), _balanced_integration(cells, groups)
     found: dict[str, dict[str, CellTrade]] = {}
     for i, method in enumerate(own.methods):
         for k, instruction in enumerate(own.instructions):
@@ -258,16 +260,17 @@ def _inverse_efficiency(cells: PersonCells) -> FloatArray:
     return found
 
 
-def _balanced_integration(cells: PersonCells) -> FloatArray:
-    """The score of the people who have a correct answer in every cell that anybody has; NaN for the others."""
-    there = (cells.trials > 0.0).any(axis=0)
-    rates, times = cells.rate[:, there], cells.mean_correct_s[:, there]
-    whole = np.isfinite(times).all(axis=1)
-    scores = np.full(rates.shape, np.nan)
-    if whole.any():
-        scores[whole] = balanced_integration(rates[whole], times[whole])
+def _balanced_integration(cells: PersonCells, groups: Sequence[IndexArray]) -> FloatArray:
+    """The score of the people who have a correct answer in every cell that anybody of their group has; else NaN."""
+    whole = np.zeros(cells.rate.shape, dtype=np.bool_)
+    for group in groups:
+        there = (cells.trials[:, group] > 0.0).any(axis=0)
+        scored = np.isfinite(cells.mean_correct_s[:, group]) & there
+        people = np.flatnonzero((scored == there).all(axis=(1, 2)))
+        whole[np.ix_(people, group)] = there
     found = np.full(cells.rate.shape, np.nan)
-    found[:, there] = scores
+    if whole.any():
+        found[whole] = balanced_integration(cells.rate[whole], cells.mean_correct_s[whole])
     return found
 
 
