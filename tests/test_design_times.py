@@ -123,6 +123,19 @@ def test_the_effect_of_the_instruction_is_paired_by_person() -> None:
     assert told == pytest.approx(((own["speed"] - own["accuracy"]).mean(), interval.low, interval.high))
 
 
+def test_instructions_stand_in_the_order_of_the_design() -> None:
+    """By the alphabet it would be 'care' less 'rush'."""
+    config, table = answered(people=2)
+    names = {"speed": "rush", "accuracy": "care"}
+    told = {"levels": ["rush", "care"], "texts": {"rush": "Be fast.", "care": "Be sure."}}
+    factors = {**FACTORS, "instruction": told}
+    config = design(factors=factors, order={"set": ["instruction"], "sets": 2}, questions={"response": WHICH})
+    found = measured(config, table.assign(instruction=table["instruction"].map(names)))
+    assert found.instructions == ("rush", "care")
+    assert {(one.a, one.b) for one in found.instruction_effects} == {("rush", "care")}
+    assert found.methods[FIRM]["rush"].mean_s.mean < found.methods[FIRM]["care"].mean_s.mean
+
+
 def test_the_results_say_in_a_sentence_what_haste_gave() -> None:
     config, table = answered()
     (said,) = result_sentences("test", shown(config, table).statistics.designs["test"])

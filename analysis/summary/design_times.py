@@ -70,10 +70,15 @@ def question_times(
         "correct": correct,
         **{f"response_{part}": table[f"{name}_{part}"] for part in ("time_s", "source")},
         "response_time_valid": table[f"{name}_time_valid"],
-        **({INSTRUCTION: table[INSTRUCTION]} if INSTRUCTION in table else {}),
+        **({INSTRUCTION: _told(design, table)} if INSTRUCTION in table else {}),
     }
     between = [place for place, factor in enumerate(factors) if factor in design.between]
     return speed_accuracy(pd.DataFrame(columns), conditions, groups=_groups(conditions, between), fits=fits)
+
+
+def _told(design: DesignConfig, table: pd.DataFrame) -> pd.Series:
+    """What was told before each trial, in the order of the design."""
+    return table[INSTRUCTION].astype(pd.CategoricalDtype([*design.factors[INSTRUCTION].all_levels], ordered=True))
 
 
 def _conditions(design: DesignConfig, factors: list[str], table: pd.DataFrame) -> tuple[pd.Series, list[str]]:

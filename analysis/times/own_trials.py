@@ -231,13 +231,18 @@ def own_trials(trials: pd.DataFrame, methods: Sequence[str]) -> OwnTrials:
 
 
 def _instructions(trials: pd.DataFrame) -> tuple[tuple[str, ...], IndexArray]:
-    """The instructions that occur, from speed to accuracy if they are those, else sorted; and each trial's place."""
+    """The instructions that occur, from speed to accuracy if they are those; and each trial's place.
+
+    Others stand in the order of an ordered column, else by the alphabet.
+    """
     if INSTRUCTION not in trials:
         return (NEUTRAL,), np.zeros(len(trials), dtype=np.intp)
     names, places = _names(trials[INSTRUCTION])
     labels = np.where(names == "", NEUTRAL, names)
-    found = {str(labels[place]) for place in np.flatnonzero(np.bincount(places, minlength=len(labels)))}
-    order = [name for name in INSTRUCTION_ORDER if name in found] if found <= {*INSTRUCTION_ORDER} else sorted(found)
+    found = [str(labels[place]) for place in np.flatnonzero(np.bincount(places, minlength=len(labels)))]
+    kind = trials[INSTRUCTION].dtype
+    others = found if isinstance(kind, pd.CategoricalDtype) and kind.ordered else sorted({*found})
+    order = [name for name in INSTRUCTION_ORDER if name in found] if {*found} <= {*INSTRUCTION_ORDER} else others
     where = np.array([order.index(label) if label in found else 0 for label in labels.tolist()], dtype=np.intp)
     return tuple(order), where[places]
 
