@@ -62,7 +62,11 @@ def started(folder: Path, display: str, *more: object) -> Iterator[tuple[AtDispl
     command = ["run", folder / "pilot" / "direction.toml", "--screen", "console", "--results", LONG, *more]
     with AtDisplay(watched_start.words(eye, command), folder, display) as screen:
         screen.focus_on("start")
-        yield screen, eye
+        try:
+            yield screen, eye
+        except AssertionError as error:
+            ended = screen.process.poll()
+            raise AssertionError(f"{error}; the program (exit code {ended}) said: {screen.kill()}") from error
 
 
 def having(*starts: str) -> Callable[[dict[str, Any]], bool]:
