@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from contextlib import suppress
 
 import pytest
 
@@ -24,23 +23,12 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.session.design_session import design_session
 from experiments.session.practice_rounds import RoundScore, is_needed, scores
 from experiments.session.remarks import EntryCorrected
-from experiments.session.steps import (
-    Answered,
-    Ask,
-    Closed,
-    Fired,
-    FireShot,
-    Inform,
-    Prepare,
-    Prepared,
-    Rate,
-    Rest,
-    Rested,
-)
+from experiments.session.steps import Answered, Ask, FireShot, Inform, Prepare, Rate, Rest, step_after
 from experiments.study.folders import place
 from experiments.tasks.questions import right_answer
 from recoil.config_files import copy_began_with
 from tests.designs import SHIPPED, changed, laws_of
+from tests.driven_designs import done
 
 SETUPS = {name: load_setup(name) for name in SHIPPED}
 SETUPS["preference"] = changed("preference", laws={"questions": {"comment": {"texts": ("soft",)}}})
@@ -229,37 +217,18 @@ def test_a_rounds_answers_count_as_they_were_corrected(tmp_path):
     assert not is_needed(setup.config, finished.plan, told, 2)
 
 
-def driven(setup, answer, in_break=None):
+def practised_by(setup, answer, in_break=None):
     """What a practice asks and tells, step by step, where each trial is answered so."""
     plan, told = practice_of(setup.config, "P01", 1), []
     session = design_session(plan, setup, told)
     step = next(session)
-    with suppress(StopIteration):
-        while True:
-            match step:
-                case Ask() | Rate():
-                    value = answer(step.trial) if isinstance(step, Ask) else 5.0
-                    outcome = Answered(value=value, by="participant")
-                case Rest():
-                    outcome = Rested(rested_s=1.0)
-                    if in_break:
-                        in_break(told, plan)
-                case Prepare():
-                    outcome = Prepared()
-                case FireShot():
-                    outcome = Fired(
-                        gun="simulated",
-                        onset_utc="2026-01-01T00:00:00Z",
-                        requested_s=0.0,
-                        pulse_start_s=0.0,
-                        pulse_end_s=0.01,
-                        home_predicted_s=0.2,
-                        motion="home",
-                    )
-                case _:
-                    outcome = Closed()
-            told.append((step, outcome))
-            step = session.send(outcome)
+    while step is not None:
+        if isinstance(step, Rest) and in_break is not None:
+            in_break(told, plan)
+        asked = isinstance(step, Ask)
+        outcome = Answered(value=answer(step.trial), by="participant") if asked else done(step, len(told))
+        told.append((step, outcome))
+        step = step_after(session, outcome)
     return plan, told
 
 
@@ -273,7 +242,7 @@ def test_a_block_is_asked_about_once_also_if_a_correction_in_the_break_ends_the_
         right = [trial for trial in plan.trials if trial.set == 1]
         told += [(None, EntryCorrected(trial=one, question="response", value=one.direction)) for one in right]
 
-    _, told = driven(setup, lambda trial: {"forward": "backward"}.get(trial.direction, "forward"), all_right)
+    _, told = practised_by(setup, lambda trial: {"forward": "backward"}.get(trial.direction, "forward"), all_right)
     assert Counter(step.kind for step, _ in told if isinstance(step, Ask | Rate | Rest)) == {
         "ask": 6,
         "rate": 6,
@@ -286,7 +255,7 @@ def test_trials_in_which_nothing_is_right_keep_nobody_practising():
     rounds = {"repetitions": 1, "of": ("voltage_V",), "until_right": 1.0, "rounds": 3}
     setup = changed("stronger", factors=levels, practice=rounds)
     question = setup.config.questions["stronger"]
-    plan, told = driven(setup, lambda trial: right_answer(setup.config, question, trial) or "first")
+    plan, told = practised_by(setup, lambda trial: right_answer(setup.config, question, trial) or "first")
     assert scores(setup.config, plan, told) == [RoundScore(2, 2)]
 
 

@@ -1296,18 +1296,23 @@ def room_for(disk: pytest.MonkeyPatch, left: int) -> None:
     disk.setattr(storage, "write_all", while_it_lasts)
 
 
+def begin_to_correct(sitting: Sitting, *, halted: bool) -> None:
+    """An answer is entered and opened again, after an emergency stop if so."""
+    sitting.to(S.ASKING)
+    assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
+    sitting.to(S.PREPARING)
+    if halted:
+        assert sitting.live.offer(events.EmergencyStop())
+        sitting.settle()
+    assert by_hand(sitting, events.Undo())
+
+
 @pytest.mark.parametrize("halted", [False, True])
 def test_a_correction_that_cannot_be_written_counts_nowhere_and_nothing_follows_from_it(
     halted: bool, tmp_path: Path
 ) -> None:
     with sat(DIRECTION, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
-        sitting.to(S.ASKING)
-        assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
-        sitting.to(S.PREPARING)
-        if halted:
-            assert sitting.live.offer(events.EmergencyStop())
-            sitting.settle()
-        assert by_hand(sitting, events.Undo())
+        begin_to_correct(sitting, halted=halted)
         entry = sitting.position.correcting
         assert entry is not None
         full_for_one_record(disk)
@@ -1329,13 +1334,7 @@ def test_a_run_that_ends_on_a_full_disk_says_that_a_correction_is_to_be_entered_
     halted: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with sat(DIRECTION, tmp_path) as sitting:
-        sitting.to(S.ASKING)
-        assert by_hand(sitting, events.Answer(response="forward", at_s=sitting.clock.now()))
-        sitting.to(S.PREPARING)
-        if halted:
-            assert sitting.live.offer(events.EmergencyStop())
-            sitting.settle()
-        assert by_hand(sitting, events.Undo())
+        begin_to_correct(sitting, halted=halted)
         monkeypatch.setattr(storage, "sync", full)
         assert sitting.live.offer(events.Correct(value="backward"))
         wait_for(lambda: sitting.window.troubles, "it is not said")
