@@ -170,6 +170,19 @@ def test_the_mean_over_conditions_is_of_those_that_a_person_meets_where_a_factor
     )
 
 
+def test_a_level_with_a_comma_changes_nothing_of_who_meets_what() -> None:
+    _, table = answered(people=4)
+    surface = {"levels": ["wet, cold", "dry"]}
+    factors = {"surface": surface, **FACTORS, "grip": {**FACTORS["grip"], "between": True}}
+    config = design(factors=factors, order={"set": ["instruction"], "sets": 2}, questions={"response": WHICH})
+    table = table.assign(surface=np.array(surface["levels"])[np.arange(len(table)) % 2])
+    table = table[(table["grip"] == "tight") == table["participant_id"].isin(["P0", "P1"])]
+    over = next(one for one in measured(config, table).instruction_effects if one.method is None)
+    own = table.groupby(["participant_id", "surface", "method", "instruction"])["response_time_s"].mean()
+    own = own.groupby(["participant_id", "instruction"]).mean().unstack()
+    assert (over.mean_s.people, over.mean_s.mean) == (4, pytest.approx((own["speed"] - own["accuracy"]).mean()))
+
+
 def test_the_first_answer_is_where_the_start_leans_to() -> None:
     """Somebody who says "backward" sooner than "forward", and the first answer is that."""
     config, table = answered(people=2, repetitions=20)

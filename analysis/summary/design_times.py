@@ -73,7 +73,7 @@ def question_times(
         **({INSTRUCTION: _told(design, table)} if INSTRUCTION in table else {}),
     }
     between = [place for place, factor in enumerate(factors) if factor in design.between]
-    return speed_accuracy(pd.DataFrame(columns), conditions, groups=_groups(conditions, between), fits=fits)
+    return speed_accuracy(pd.DataFrame(columns), [*conditions], groups=_groups(conditions, between), fits=fits)
 
 
 def _told(design: DesignConfig, table: pd.DataFrame) -> pd.Series:
@@ -81,21 +81,22 @@ def _told(design: DesignConfig, table: pd.DataFrame) -> pd.Series:
     return table[INSTRUCTION].astype(pd.CategoricalDtype([*design.factors[INSTRUCTION].all_levels], ordered=True))
 
 
-def _conditions(design: DesignConfig, factors: list[str], table: pd.DataFrame) -> tuple[pd.Series, list[str]]:
-    """The condition of each row, and those that occur in the order of the design."""
+def _conditions(
+    design: DesignConfig, factors: list[str], table: pd.DataFrame
+) -> tuple[pd.Series, dict[str, tuple[str, ...]]]:
+    """The condition of each row, and those that occur in the order of the design, each with its parts."""
     levels = [[f"{factor} {shown_level(level)}" for level in design.factors[factor].all_levels] for factor in factors]
-    named = [", ".join(some) or ALL_TRIALS for some in product(*levels)]
+    named = {", ".join(parts) or ALL_TRIALS: parts for parts in product(*levels)}
     rows = pd.Series("" if factors else ALL_TRIALS, index=table.index)
     for place, factor in enumerate(factors):
         rows = rows + f"{', ' if place else ''}{factor} " + table[factor].map(shown_level).astype(str)
     found = set(rows.unique())
-    return rows.astype("category"), [one for one in named if one in found]
+    return rows.astype("category"), {one: parts for one, parts in named.items() if one in found}
 
 
-def _groups(conditions: list[str], between: list[int]) -> list[list[str]]:
+def _groups(conditions: Mapping[str, tuple[str, ...]], between: list[int]) -> list[list[str]]:
     """The conditions that the same people meet: alike in the parts, by their places, that vary between people."""
     found: dict[tuple[str, ...], list[str]] = {}
-    for condition in conditions:
-        parts = condition.split(", ")
+    for condition, parts in conditions.items():
         found.setdefault(tuple(parts[place] for place in between), []).append(condition)
     return [*found.values()]
