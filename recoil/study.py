@@ -148,7 +148,8 @@ def _state(run: RunProgress) -> str:
         counts += f", last record {date_text(run.last_utc)}"
     lines = [f"{run.state}{counts if run.state in _UNDER_WAY and run.planned else ''}", " > ".join(run.methods)]
     gun = "on a simulated gun" if run.data == "simulated gun" else ""
-    return "\n".join(filter(None, [*lines, gun, "practice done" if run.practised else ""]))
+    practice = f"practice done{', too little right' if run.practice_missed else ''}" if run.practised else ""
+    return "\n".join(filter(None, [*lines, gun, practice]))
 
 
 def _count_lines(found: StudyStatus) -> Iterator[str]:

@@ -24,7 +24,7 @@ from experiments.session.design_session import design_session
 from experiments.session.practice_rounds import RoundScore, is_needed, scores
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import Answered, Ask, FireShot, Inform, Prepare, Rate, Rest, step_after
-from experiments.study.folders import place
+from experiments.study.folders import open_study, overview, place
 from experiments.tasks.questions import right_answer
 from recoil.config_files import copy_began_with
 from tests.designs import SHIPPED, changed, laws_of
@@ -182,8 +182,8 @@ def in_rounds(share, until_right=0.8, rounds=3):
     return changed("direction", laws=people, practice=practice)
 
 
-def practised(setup, results, screen=synthetic_screen):
-    request = RunRequest(setup=setup, participant_id="P01", results=results, seed=1, practice=True)
+def practised(setup, results, screen=synthetic_screen, by="synthetic"):
+    request = RunRequest(setup=setup, participant_id="P01", results=results, seed=1, practice=True, screen=by)
     return run(request, screen, VirtualClock())
 
 
@@ -202,6 +202,14 @@ def test_a_practice_in_rounds_is_over_once_enough_of_one_are_right(share, rounds
     rows = rows_of(finished.place.table.read_bytes())
     assert [row["set"] for row in rows if row["response"]] == [str(one) for one in felt]
     assert rebuild(finished.place.journal)[1] == finished.place.table.read_bytes()
+
+
+@pytest.mark.slow
+def test_the_study_says_that_a_practice_was_done_but_not_reached_until_one_is(tmp_path):
+    for share, missed in ((1e-9, True), (1 - 1e-9, False), (1e-9, False)):
+        practised(in_rounds(share, rounds=2), tmp_path, by="terminal")
+        found = overview(open_study(tmp_path)).participants[0].runs[0]
+        assert (found.practised, found.practice_missed) == (True, missed)
 
 
 @pytest.mark.slow

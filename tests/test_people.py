@@ -55,6 +55,10 @@ def test_a_time_of_day_has_hours_and_minutes() -> None:
     [
         (RunProgress(experiment="direction", state="not begun"), "–"),
         (RunProgress(experiment="direction", state="not begun", practised=True), "–\npractice done"),
+        (
+            RunProgress(experiment="direction", state="not begun", practised=True, practice_missed=True),
+            "–\npractice done, too little right",
+        ),
         (RunProgress(experiment="direction", state="done", answered=60, planned=60, last_utc="x"), "done"),
         (RunProgress(experiment="direction", state="unreadable"), "cannot be read"),
         (RunProgress(experiment="direction", state="synthetic"), "synthetic"),

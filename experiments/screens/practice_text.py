@@ -6,7 +6,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.screens.phrases import phrase
 from experiments.session.history import History
-from experiments.session.practice_rounds import scores
+from experiments.session.practice_rounds import is_to_be_repeated, scores
 
 
 def practice_text(design: DesignConfig, plan: Plan, told: History, *, over: bool) -> str:
@@ -28,9 +28,3 @@ def practice_text(design: DesignConfig, plan: Plan, told: History, *, over: bool
     if not (over and is_to_be_repeated(design, plan, told)):
         return said
     return phrase("{said} That was not reached: explain the task again, then practise anew.", said=said)
-
-
-def is_to_be_repeated(design: DesignConfig, plan: Plan, told: History) -> bool:
-    """Whether a practice that is over has not reached what was wanted."""
-    wanted, rounds = design.practice.until_right, scores(design, plan, told)
-    return wanted is not None and bool(rounds) and not rounds[-1].reaches(wanted)

@@ -57,3 +57,9 @@ def is_needed(design: DesignConfig, plan: Plan, told: History, number: int) -> b
     """Whether a round is to be presented, now that all before it is done."""
     wanted = design.practice.until_right
     return wanted is None or not any(one.reaches(wanted) for one in scores(design, plan, told)[: number - 1])
+
+
+def is_to_be_repeated(design: DesignConfig, plan: Plan, told: History) -> bool:
+    """Whether a practice that is over has not reached what was wanted."""
+    wanted, rounds = design.practice.until_right, scores(design, plan, told)
+    return wanted is not None and bool(rounds) and not rounds[-1].reaches(wanted)

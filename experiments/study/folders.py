@@ -26,6 +26,7 @@ from experiments.rebuild import began_with
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.session.history import answered
+from experiments.session.practice_rounds import is_to_be_repeated
 from experiments.study import register
 from experiments.study.balance import group_of_next_run, is_balanced, row_of_next_run
 from experiments.study.preregistration import (
@@ -270,7 +271,8 @@ class _Look:
 
     def _run(self, where: Place) -> RunProgress:
         try:
-            return replace(self._progress(where), practised=_practised(where))
+            missed = _missed(where)
+            return replace(self._progress(where), practised=bool(missed), practice_missed=bool(missed) and all(missed))
         except JournalError as error:
             self.problems.append(str(error))
             return RunProgress(experiment=where.experiment, state="unreadable")
@@ -384,15 +386,16 @@ def _is_held(where: Place) -> bool:
         raise JournalError(f"{where.journal}: cannot be opened ({error.strerror})") from error
 
 
-def _practised(where: Place) -> bool:
-    """Whether a practice was done to its end, also one that a later practice has set aside."""
-    practice = replace(where, practice=True)
+def _missed(where: Place) -> list[bool]:
+    """Of each practice that was done to its end, also of those set aside: whether it missed what the design wants."""
+    practice, found = replace(where, practice=True), list[bool]()
     for path in practice.folder.glob(f"{practice.journal.stem}*{practice.journal.suffix}"):
         with suppress(JournalError):  # a practice is not analysed, so a broken one is nobody's concern
             contents = journal.read_journal(path)
             if contents.finished and contents.head.participant == "person":
-                return True
-    return False
+                design = began_with(contents.head)
+                found.append(is_to_be_repeated(design, contents.plan, replay.history(contents)))
+    return found
 
 
 def refuse_without_practice(setup: Setup[DesignConfig]) -> None:

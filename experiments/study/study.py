@@ -37,7 +37,8 @@ class RunProgress:
 
     `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run, and whose
     `data` they are. All five are empty where no run has begun, or where its journal cannot be read. `practised`: a
-    practice was done to its end. `language`: the participant's, where that is not English.
+    practice was done to its end; `practice_missed`: in none was enough right, as the design wants it. `language`: the
+    participant's, where that is not English.
     """
 
     experiment: str
@@ -48,6 +49,7 @@ class RunProgress:
     methods: tuple[str, ...] = ()
     data: DataKind | None = None
     practised: bool = False
+    practice_missed: bool = False
     language: str = ""
 
 

@@ -10,8 +10,9 @@ from experiments.screens import texts
 from experiments.screens.console.keys import is_on_buttons
 from experiments.screens.console.view import Ended, Seen, method_text
 from experiments.screens.phrases import isolated, phrase
-from experiments.screens.practice_text import is_to_be_repeated, practice_text
+from experiments.screens.practice_text import practice_text
 from experiments.session.history import entered_value
+from experiments.session.practice_rounds import is_to_be_repeated
 from experiments.session.states import State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Prepare, Present, Rate, Rest, what
 

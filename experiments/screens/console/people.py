@@ -15,7 +15,8 @@ _CELL = {"done": "done", "not begun": "–", "unreadable": phrase("cannot be rea
 
 def cell_text(run: RunProgress) -> str:
     """A run in the table of participants."""
-    practice = [phrase("practice done")] if run.practised else []
+    how = phrase("practice done, too little right") if run.practice_missed else phrase("practice done")
+    practice = [how] if run.practised else []
     if run.state in _CELL:
         return "\n".join([_CELL[run.state], *practice])
     counts = phrase(", {answered} of {planned}", answered=run.answered, planned=run.planned) if run.planned else ""
