@@ -12,10 +12,11 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, model_validator
 
 from device.parameters import GunParameters
-from device.words import Direction, first_few
+from device.words import Direction
 from experiments.config.door import ConsoleConfig, Model, Text, leaves
 from experiments.config.findings import DESIGN_NAME, LANGUAGE_CODE
 from experiments.config.lines import LineText
+from experiments.design.answer_problems import answer_problems
 from experiments.design.around_trials import (
     BreaksConfig,
     FatigueConfig,
@@ -28,7 +29,6 @@ from experiments.design.language import (
     DRIVEN,
     EMPTY,
     INSTRUCTION_FACTOR,
-    INTERVAL_NAMES,
     METHOD_FACTOR,
     TRAIN_INTERVAL,
     ColumnName,
@@ -181,8 +181,8 @@ def _problems(design: DesignConfig) -> Iterator[str]:
     if design.adaptive is not None:
         yield from procedure_problems(design.adaptive, design.factors, design.order, design.trial, design.questions)
     for name, question in design.questions.items():
-        yield from (f"questions.{name}: {problem}" for problem in _right_answer_problems(design, question))
-        yield from (f"questions.{name}: {problem}" for problem in _pair_answer_problems(design, question))
+        found = answer_problems(question, design.trial, design.factors)
+        yield from (f"questions.{name}: {problem}" for problem in found)
     unknown = sorted(set(design.assumed) - set(leaves(design)))
     if unknown:
         yield f"assumed names {', '.join(unknown)}, which this design does not have; name existing keys"
@@ -391,61 +391,3 @@ def _feedback_problems(design: DesignConfig) -> Iterator[str]:
     if design.practice.until_right is not None and not scored:
         key = f"practice.until_right = {design.practice.until_right:g}"
         yield f"{key}: nothing is right or wrong; give a question `correct`, or remove until_right and rounds"
-
-
-def _right_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
-    if question.correct is None:
-        return
-    if question.correct in {"interval", "larger"}:
-        yield from _interval_problems(design, question)
-    elif question.correct == "stimulus":
-        if question.kind != "yes-no" or not design.trial.catch:
-            yield "correct = 'stimulus' is for yes-no with catch trials; set trial.catch, or remove the key"
-    elif question.correct not in design.factors:
-        yield f"correct = {question.correct!r} is no factor; name a factor, or interval, larger or stimulus"
-    else:
-        answers = question.named_answers
-        levels = sorted(map(shown_level, design.factors[question.correct].all_levels))
-        if not set(levels) <= set(answers):
-            shown = f"its levels {first_few(levels, 9)} are not all among the answers {', '.join(answers)}"
-            yield f"correct = {question.correct!r}: {shown}"
-    if question.when == "block":
-        yield "when = 'block': a question about remembered trials is not scored; remove `correct`"
-
-
-def _pair_answer_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
-    """An answer about a pair is counted by its place: another order would score ties as choices."""
-    of_pair, answers = INTERVAL_NAMES[:2], question.answers
-    misplaced = [one for at, one in enumerate(of_pair) if one in answers and answers[at] != one]
-    if misplaced and design.trial.kind == "pair":
-        rest = [one for one in answers if one not in of_pair]
-        yield (
-            f"answers: {misplaced[0]} is not in its place; of a pair the first answer chooses the first interval, the "
-            f"second the other, and any more is a tie: write {', '.join((*of_pair, *rest))}"
-        )
-
-
-def _interval_problems(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
-    trial, correct = design.trial, question.correct
-    if trial.intervals == 1:
-        yield f"correct = {correct!r}: a trial of kind {trial.kind!r} has one interval"
-        return
-    if correct == "larger" and trial.kind not in {"two-interval", "pair"}:
-        yield f"correct = 'larger' is of two intervals; of kind {trial.kind!r} say interval"
-    elif correct == "larger" and not _numeric(design, trial.compare):
-        yield f"correct = 'larger': the levels of {trial.compare} are no numbers, so none is larger"
-    elif correct == "larger" and isinstance(trial.standard, str):
-        yield f"correct = 'larger': the standard is no number (it is {trial.standard!r}), so none is larger"
-    elif correct == "interval" and trial.standard in design.factors[trial.compare or ""].all_levels:
-        yield f"correct = 'interval': the standard {trial.standard} is a level as well, where neither is the comparison"
-    elif correct == "interval" and trial.kind == "pair":
-        yield "correct = 'interval': of a pair neither is the comparison; say larger, or leave the key out"
-    places = ("a", "b") if trial.kind == "abx" else INTERVAL_NAMES[: trial.intervals]
-    if set(question.named_answers) != set(places):
-        shown = f"the answers must be {', '.join(places)}, not {', '.join(question.named_answers)}"
-        yield f"correct = {correct!r}: {shown}"
-
-
-def _numeric(design: DesignConfig, name: str | None) -> bool:
-    factor = design.factors.get(name or "")
-    return factor is not None and not isinstance(factor.all_levels[0], str)
