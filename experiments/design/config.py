@@ -370,6 +370,9 @@ def _comparison_problems(design: DesignConfig, compare: str, factor: FactorConfi
         yield f"trial.compare = {compare!r} is constant in a block or person; compare one that varies between trials"
     if factor.within is not None:
         yield f"trial.compare = {compare!r} is nested; compare one that is not"
+    inner = [name for name, one in design.factors.items() if one.within == compare]
+    if inner:
+        yield f"trial.compare = {compare!r}: factors.{inner[0]} is nested in it; cross them, or compare another"
     if trial.kind == "pair" and len(factor.all_levels) < 2:
         yield f"trial.kind = 'pair': {compare} has one level, which makes no pair"
     if trial.standard is None:
