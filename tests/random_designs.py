@@ -55,6 +55,8 @@ def trials(draw: st.DrawFn, names: list[str]) -> dict[str, Any]:
         found["compare"] = draw(st.sampled_from(names))
     if kind in ("two-interval", "abx", "oddity"):
         found["standard"] = draw(st.sampled_from([15.0, "asymmetric-1", "none"]))
+    if kind == "two-interval":
+        found["standard_interval"] = draw(st.sampled_from(["random", "first", "second"]))
     if draw(st.integers(0, 3)) == 0:
         found["catch"] = draw(SMALL)
     return found

@@ -16,6 +16,7 @@ from tests.designs import QUESTION, design
 ONE = {"method": {"levels": ["a"]}}
 VOLTS = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [12.0, 20.0]}}
 INTERVALS = {"kind": "two-interval", "compare": "voltage_V", "standard": 16.0}
+FIRST = INTERVALS | {"standard_interval": "first"}
 WAYS = {"levels": ["forward", "backward"]}
 
 
@@ -185,6 +186,28 @@ def asked(**keys):
                 "questions": asked(answers=["first", "second", "third"], correct="larger"),
             },
             "correct = 'larger' is of two intervals",
+        ),
+        (
+            {"factors": VOLTS, "trial": FIRST | {"kind": "abx"}},
+            "trial.standard_interval: a trial of kind 'abx' has none; remove it",
+        ),
+        (
+            {
+                "factors": {
+                    "method": {"levels": ["a", "b"]},
+                    "voltage_V": {"within": "method", "levels": {"a": [8.0], "b": [9.0]}},
+                },
+                "trial": {"kind": "pair", "compare": "method"},
+            },
+            "trial.compare = 'method': factors.voltage_V is nested in it",
+        ),
+        (
+            {"factors": VOLTS, "trial": FIRST, "questions": asked(correct="interval")},
+            "correct = 'interval': with trial.standard_interval = 'first' the same answer is right in every trial",
+        ),
+        (
+            {"factors": VOLTS, "trial": FIRST | {"standard": 12.0}, "questions": asked(correct="larger")},
+            "correct = 'larger': with trial.standard_interval = 'first' the same answer is right in every trial",
         ),
         ({"timing": {"hand_over_s": 1.0, "planned_s": 0.0}}, "timing.planned_s = 0.0"),
         ({"assumed": ["timing.speed"]}, "assumed names timing.speed"),

@@ -136,6 +136,33 @@ def test_the_comparison_is_in_every_place_as_often_as_it_gets(kind, forms, repet
         assert {*trial.intervals} == {16.0, trial.level("voltage_V")}
 
 
+UP_DOWN = {"kind": "up-down", "of": ["voltage_V"], "starts": [20.0], "steps": [2.0], "trials": 12}
+
+
+@pytest.mark.parametrize(("standard_interval", "standard_at"), [("first", 0), ("second", 1)])
+@pytest.mark.parametrize("chosen", [{}, {"procedure": UP_DOWN}])
+def test_a_standard_with_an_interval_of_its_own_is_always_there(standard_interval, standard_at, chosen):
+    config = design(
+        factors={"method": {"levels": ["a"]}, "voltage_V": {"levels": [12.0, 14.0, 16.0, 18.0, 20.0]}},
+        order={"repetitions": 1 if chosen else 3},
+        trial={
+            "kind": "two-interval",
+            "compare": "voltage_V",
+            "standard": 16.0,
+            "standard_interval": standard_interval,
+        },
+        questions={
+            "answer": {"kind": "choice", "text": "?", "answers": ["first", "second"], "correct": "larger"},
+        },
+        **chosen,
+    )
+    for seed in range(5):
+        trials = plan_of(config, "P01", seed).trials
+        assert len(trials) == (12 if chosen else 15)
+        assert {trial.intervals[standard_at] for trial in trials} == {16.0}
+        assert {trial.odd for trial in trials} == {1 - standard_at}
+
+
 def test_a_nested_factor_has_the_levels_of_the_one_that_it_is_nested_in():
     config = design(
         factors={

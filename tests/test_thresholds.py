@@ -19,9 +19,11 @@ from analysis.psychometric.priors import default_priors
 from analysis.report.figures import style
 from analysis.report.figures.style import method_marker
 from analysis.report.labels import labelled
+from analysis.summary.announced import names_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.tracks import figure_tracks
+from analysis.summary.sections.designs import result_sentences
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from analysis.summary.thresholds import MOST_FITTED, Thresholds, priors_of, thresholds
 from experiments.design.config import DesignConfig
@@ -224,6 +226,49 @@ def test_a_comparison_with_a_standard_counts_how_often_the_level_was_chosen(ship
         rows = table[table["voltage_V"] == point.level]
         chosen = rows["correct"] if point.level > 14.0 else 1 - rows["correct"]
         assert point.right == chosen.sum()
+
+
+@pytest.mark.parametrize(("standard_interval", "of_level"), [("first", "second"), ("second", "first")])
+def test_a_standard_with_an_interval_of_its_own_has_choices_over_itself_a_caution_and_no_d_prime(
+    standard_interval: str, of_level: str
+) -> None:
+    """Of two equal shots the one that is judged is known; a lean to its answer is in every number."""
+    one = design(
+        factors={"method": {"levels": ["asymmetric-1"]}, "voltage_V": {"levels": [12.0, 14.0, 16.0]}},
+        trial={
+            "kind": "two-interval",
+            "compare": "voltage_V",
+            "standard": 14.0,
+            "standard_interval": standard_interval,
+        },
+        questions={
+            "which": {"kind": "choice", "text": "Which?", "answers": ["first", "second"], "correct": "larger"},
+        },
+    )
+    of_standard = {"first": "second", "second": "first"}[of_level]
+    rows = [
+        {
+            "participant_id": who,
+            "method": "asymmetric-1",
+            "voltage_V": level,
+            "which": of_level if number < chosen else of_standard,
+            "correct": None if level == 14.0 else int((number < chosen) == (level > 14.0)),
+        }
+        for who in ("A", "B")
+        for level, chosen in ((12.0, 2), (14.0, 7), (16.0, 9))
+        for number in range(10)
+    ]
+    summary = summarise(one, pd.DataFrame(rows))
+    which = summary.questions["which"]
+    assert which.thresholds is not None
+    points = which.thresholds.conditions[0].points
+    assert [(point.level, point.right, point.trials) for point in points] == [(12, 4, 20), (14, 14, 20), (16, 18, 20)]
+    assert [test.statistic for test in which.tests if test.name == "d_prime"] == [None]
+    assert "d_prime" not in names_of_tests(one, one.questions["which"])
+    said = " ".join(result_sentences("made", summary))
+    assert "No d′: the standard is always in one interval, so a lean to an answer is not balanced out" in said
+    (section,) = threshold_sections("made", summary)
+    assert any(f"always in the {standard_interval} interval" in words for words in section.paragraphs)
 
 
 def of_a_standard(standard: float, *, above: bool) -> Any:

@@ -24,7 +24,7 @@ def names_of_tests(design: DesignConfig, question: QuestionConfig) -> tuple[Test
     """The tests of a question by their names in the statistics; none where its answers are only described."""
     if question.kind == "text":
         return ()
-    return (*_comparisons(design, question), *(() if design.adapted else _sensitivity(question)))
+    return (*_comparisons(design, question), *(() if design.adapted else _sensitivity(design, question)))
 
 
 def _comparisons(design: DesignConfig, question: QuestionConfig) -> Iterator[TestName]:
@@ -68,8 +68,9 @@ def _is_described(design: DesignConfig, question: QuestionConfig, within: list[s
     )
 
 
-def _sensitivity(question: QuestionConfig) -> Iterator[TestName]:
-    if question.correct in {"stimulus", "interval", "larger"}:
+def _sensitivity(design: DesignConfig, question: QuestionConfig) -> Iterator[TestName]:
+    balanced = question.correct in {"interval", "larger"} and design.trial.standard_interval == "random"
+    if question.correct == "stimulus" or balanced:
         yield "d_prime"
     if question.correct == "stimulus":
         yield "criterion"

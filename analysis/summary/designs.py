@@ -131,7 +131,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
     conditions = {_named_condition(some, factors): some for some in there if factors}
     tests = (
         *condition_tests(design, question, people, _groups(design, found.real)),
-        *(() if design.adapted else sensitivity(design.trial.kind, question, scored, conditions)),
+        *(() if design.adapted else sensitivity(design.trial, question, scored, conditions)),
     )
     return QuestionSummary(
         kind=question.kind,

@@ -12,19 +12,22 @@ import scipy
 from analysis.stats.binomial import yes_no
 from analysis.stats.discrimination import Task, discrimination
 from analysis.summary.question_results import DesignTest
-from experiments.design.language import QuestionConfig
+from experiments.design.language import QuestionConfig, TrialConfig
 
 _TASKS: Mapping[str, Task] = {"two-interval": "two-interval", "pair": "two-interval", "abx": "abx", "oddity": "oddity"}
+_NOT_BALANCED = "the standard is always in one interval, so a lean to an answer is not balanced out"
 
 
 def sensitivity(
-    kind: str, question: QuestionConfig, scored: pd.DataFrame, conditions: Mapping[str, pd.DataFrame]
+    trial: TrialConfig, question: QuestionConfig, scored: pd.DataFrame, conditions: Mapping[str, pd.DataFrame]
 ) -> Iterator[DesignTest]:
     """d′ of all people's answers together, by the formula of the task: of all conditions, and of each.
 
     Of detection the mean of people's own d′ comes last: where people differ, that of their answers together is another.
 
-    `kind`: of the design's trials. `conditions`: the rows of each condition, without catch trials, by its name.
+    None where the standard has an interval of its own: who leans to an answer is right more or less often by that.
+
+    `conditions`: the rows of each condition, without catch trials, by its name.
     """
     if question.correct == "stimulus":
         stimulus = scored["stimulus"].astype(int) == 1
@@ -32,9 +35,11 @@ def sensitivity(
         for name, some in {"stimulus": scored[stimulus], **conditions}.items():
             yield from _detection(name, some, noise)
         yield from _mean_of_people(scored)
+    elif question.correct in {"interval", "larger"} and trial.standard_interval != "random":
+        yield DesignTest(name="d_prime", effect=trial.kind, reason=_NOT_BALANCED)
     elif question.correct in {"interval", "larger"} and len(scored):
-        for name, some in {kind: scored, **conditions}.items():
-            found = discrimination(int(some["score"].sum()), len(some), _TASKS[kind])
+        for name, some in {trial.kind: scored, **conditions}.items():
+            found = discrimination(int(some["score"].sum()), len(some), _TASKS[trial.kind])
             yield DesignTest(name="d_prime", effect=name, statistic=float(found.d_prime))
 
 

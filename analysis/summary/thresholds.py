@@ -29,7 +29,14 @@ from analysis.report.serial import UNWRITTEN, beside
 from analysis.stats.arrays import FloatArray
 from analysis.summary.tracks import TrackAnswers, tracks_in
 from experiments.design.config import DesignConfig
-from experiments.design.language import INTERVAL_NAMES, YES, Level, QuestionConfig, shown_level
+from experiments.design.language import (
+    INTERVAL_NAMES,
+    YES,
+    Level,
+    QuestionConfig,
+    StandardInterval,
+    shown_level,
+)
 from experiments.design.procedures.config import PosteriorConfig
 from experiments.record.tables import AT_EDGE
 from experiments.tasks.questions import chance, correct_columns
@@ -68,9 +75,10 @@ class Thresholds:
     """The psychometric functions of one question over `factor`; none with a `reason`.
 
     `share`: of what, right answers, yes, or the level chosen over the standard. `standard`: what levels were compared
-    with. `guess`: chance where the design knows it. Of the `people` so many were `fitted`. `even`: trials whose two
-    intervals had the same level. `tracks`: of a procedure that chose the levels from the answers; `own_priors`: its
-    priors of width and lapse rate are the fit's. `at_edge`: trials of them whose level was the last that there is.
+    with, in `standard_interval` if that was always the same. `guess`: chance where the design knows it. Of the
+    `people` so many were `fitted`. `even`: trials whose two intervals had the same level. `tracks`: of a procedure
+    that chose the levels from the answers; `own_priors`: its priors of width and lapse rate are the fit's. `at_edge`:
+    trials of them whose level was the last that there is.
     """
 
     factor: str
@@ -78,6 +86,7 @@ class Thresholds:
     guess: float | None = None
     falling: bool = False
     standard: Level | None = None
+    standard_interval: StandardInterval = field(default="random", metadata=UNWRITTEN)
     people: int = 0
     fitted: int = 0
     even: int = 0
@@ -104,7 +113,13 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     if factor is None or share is None:
         return None
     known = chance(question) if share == "right" else None
-    found = Thresholds(factor=factor, share=share, guess=known, standard=design.trial.standard)
+    found = Thresholds(
+        factor=factor,
+        share=share,
+        guess=known,
+        standard=design.trial.standard,
+        standard_interval=design.trial.standard_interval,
+    )
     if why := _unordered(design, factor, share):
         return replace(found, reason=why)
     level = pd.to_numeric(table[factor], errors="coerce")
@@ -214,6 +229,9 @@ def _successes(
         return (given == YES).astype(float).where(given.notna())
     if share == "right":
         return pd.to_numeric(table[correct_columns(design.questions)[name]], errors="coerce")
+    if design.trial.standard_interval != "random":  # the comparison is known, also where both levels are the same
+        comparison = INTERVAL_NAMES[design.trial.standard_interval == INTERVAL_NAMES[0]]
+        return (given == comparison).astype(float).where(given.notna())
     intervals = [pd.to_numeric(table[f"{factor}_{place}"], errors="coerce") for place in (1, 2)]
     level = pd.to_numeric(table[factor], errors="coerce")
     first, second = ((of == level) & ~(other == level) for of, other in (intervals, intervals[::-1]))

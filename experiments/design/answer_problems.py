@@ -21,6 +21,7 @@ def _right_answer_problems(question: QuestionConfig, trial: TrialConfig, factors
         return
     if question.correct in {"interval", "larger"}:
         yield from _interval_problems(question, trial, factors)
+        yield from _constant_problems(question, trial, factors)
     elif question.correct == "stimulus":
         if question.kind != "yes-no" or not trial.catch:
             yield "correct = 'stimulus' is for yes-no with catch trials; set trial.catch, or remove the key"
@@ -67,6 +68,21 @@ def _interval_problems(question: QuestionConfig, trial: TrialConfig, factors: Fa
     if set(question.named_answers) != set(places):
         shown = f"the answers must be {', '.join(places)}, not {', '.join(question.named_answers)}"
         yield f"correct = {correct!r}: {shown}"
+
+
+def _constant_problems(question: QuestionConfig, trial: TrialConfig, factors: Factors) -> Iterator[str]:
+    """Where the standard has an interval of its own, the right answer may have one as well."""
+    if trial.standard_interval == "random":
+        return
+    standard, levels = trial.standard, factors[trial.compare or ""].all_levels
+    numbers = [level for level in levels if not isinstance(level, str)]
+    both_sides = numbers and isinstance(standard, float) and min(numbers) < standard < max(numbers)
+    if question.correct == "interval" or not both_sides:
+        yield (
+            f"correct = {question.correct!r}: with trial.standard_interval = {trial.standard_interval!r} the same "
+            "answer is right in every trial; leave `correct` out, or have levels on both sides of the standard and "
+            "say larger"
+        )
 
 
 def _numeric(factor: FactorConfig | None) -> bool:

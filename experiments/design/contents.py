@@ -8,7 +8,7 @@ from itertools import combinations
 
 from experiments.config.door import ConfigError
 from experiments.design.config import DesignConfig
-from experiments.design.language import MAX_TRIALS, Level
+from experiments.design.language import MAX_TRIALS, Level, TrialConfig
 from experiments.design.plan import Condition
 from experiments.design.streams import Stream
 
@@ -106,7 +106,7 @@ def _compared(design: DesignConfig, cell: Condition, stream: Stream) -> list[Con
     level, standard = dict(cell)[name], trial.standard
     if standard is None:
         raise ConfigError(f"trial.standard is missing: kind {trial.kind!r} compares with it")
-    forms = arrangements(trial.kind, level, standard)
+    forms = arrangements(trial, level, standard)
     chosen = [forms[place % len(forms)] for place in some_places(repetitions, stream, len(forms))]
     return [Content(cell, held, odd) for held, odd in stream.shuffled(chosen)]
 
@@ -117,10 +117,11 @@ def some_places(count: int, stream: Stream, forms: int = 2) -> range:
     return range(start, start + count)
 
 
-def arrangements(kind: str, level: Level, standard: Level) -> list[tuple[tuple[Level, ...], int]]:
+def arrangements(trial: TrialConfig, level: Level, standard: Level) -> list[tuple[tuple[Level, ...], int]]:
     """What the intervals hold, and the place of the comparison: in ABX of the one that X repeats."""
-    if kind == "two-interval":
-        return [((level, standard), 0), ((standard, level), 1)]
-    if kind == "abx":
+    if trial.kind == "two-interval":
+        forms = {"second": ((level, standard), 0), "first": ((standard, level), 1)}
+        return [form for place, form in forms.items() if trial.standard_interval in {place, "random"}]
+    if trial.kind == "abx":
         return [((*pair, pair[x]), x) for pair in ((level, standard), (standard, level)) for x in (0, 1)]
     return [(tuple(level if at == odd else standard for at in range(3)), odd) for odd in range(3)]

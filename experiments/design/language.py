@@ -223,19 +223,22 @@ EMPTY = "none"
 """The standard of a comparison with nothing: that interval has no stimulus."""
 INTERVAL_NAMES = ("first", "second", "third")
 """What the intervals of a trial are called."""
+StandardInterval = Literal["random", "first", "second"]
+"""In which of two intervals the standard is."""
 TrialKind = Literal["single", "train", "two-interval", "pair", "abx", "oddity"]
 INTERVALS: dict[TrialKind, int] = {"single": 1, "train": 1, "two-interval": 2, "pair": 2, "abx": 3, "oddity": 3}
 """How many intervals a trial of each kind has."""
 
 
 _OF_A_TRAIN, _OF_SEVERAL = ("repeat_every_s", "least_exposure_s", "max_shots"), ("gap_s",)
+_OF_TWO = ("standard_interval",)
 _UNUSED: dict[TrialKind, tuple[str, ...]] = {
-    "single": (*_OF_A_TRAIN, *_OF_SEVERAL),
-    "train": _OF_SEVERAL,
+    "single": (*_OF_A_TRAIN, *_OF_SEVERAL, *_OF_TWO),
+    "train": (*_OF_SEVERAL, *_OF_TWO),
     "two-interval": _OF_A_TRAIN,
-    "pair": _OF_A_TRAIN,
-    "abx": _OF_A_TRAIN,
-    "oddity": _OF_A_TRAIN,
+    "pair": (*_OF_A_TRAIN, *_OF_TWO),
+    "abx": (*_OF_A_TRAIN, *_OF_TWO),
+    "oddity": (*_OF_A_TRAIN, *_OF_TWO),
 }
 
 
@@ -245,6 +248,7 @@ class TrialConfig(Model):
     kind: TrialKind = "single"
     compare: ColumnName | None = None
     standard: Level | None = None
+    standard_interval: StandardInterval = "random"
     gap_s: Annotated[float, Field(gt=0, le=60)] = 1.5
     repeat_every_s: Annotated[float, Field(gt=0, le=3_600)] = 1.0
     least_exposure_s: Annotated[float, Field(ge=0, le=3_600)] = 1.0

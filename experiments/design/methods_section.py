@@ -14,6 +14,7 @@ from experiments.design.language import (
     FactorConfig,
     Level,
     QuestionConfig,
+    TrialConfig,
     shown_level,
 )
 from experiments.design.planned import PlannedRun
@@ -251,8 +252,13 @@ def _several_intervals(design: DesignConfig, planned: PlannedRun) -> str:
     if trial.kind == "oddity":
         return f"three shots {gap}, two at {named}, in random places"
     if standard == EMPTY:
-        return f"two intervals {gap}, one of them empty, each equally often first"
-    return f"two shots {gap}, one at {named}, each equally often first"
+        return f"two intervals {gap}, one of them empty, {_which_first(trial)}"
+    return f"two shots {gap}, one at {named}, {_which_first(trial)}"
+
+
+def _which_first(trial: TrialConfig) -> str:
+    fixed = trial.standard_interval
+    return "each equally often first" if fixed == "random" else f"always in the {fixed} interval"
 
 
 def _questions(design: DesignConfig) -> Iterator[str]:

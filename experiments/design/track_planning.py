@@ -71,7 +71,7 @@ def _track(
     if trial.kind == "pair":
         held = [((CHOSEN, CHOSEN), None)]
     elif trial.standard is not None:
-        held = [*arrangements(trial.kind, CHOSEN, trial.standard)]
+        held = [*arrangements(trial, CHOSEN, trial.standard)]
     forms = [
         Content(in_order(design, (*cell, *mixed)), intervals, odd, track=number)
         for mixed in cells(design, table.mixed)

@@ -183,7 +183,9 @@ def _agreement(test: DesignTest) -> str:
 def _sensitivity_words(question: QuestionSummary) -> Iterator[str]:
     """d′ of all answers, and that of people in the mean; conditions follow, and are in the table."""
     of_all = {test.name: test for test in reversed(question.tests) if test.name in _SENSITIVITY}
-    if "d_prime" in of_all:
+    if "d_prime" in of_all and of_all["d_prime"].reason:
+        yield f"No d′: {of_all['d_prime'].reason}."
+    elif "d_prime" in of_all:
         corrected = " with the log-linear correction" if question.detected else ""
         one = max(cell.people for cell in question.cells) == 1
         whose = "The participant's answers" if one else "All participants' answers together"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from analysis.psychometric.fit import Credible
 from analysis.psychometric.people import FEWEST_ANSWERS, GroupFit, PersonFit
@@ -92,7 +92,7 @@ def _section(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Sec
         return Section(title=title, paragraphs=(f"None was fitted: {of.reason}.",))
     return Section(
         title=title,
-        paragraphs=(_what(of), *_who(of), *_without(of), *_below_zero(of), *_at_edge(of), *_of_a_walk(of)),
+        paragraphs=(_what(of), *(words for part in _REMARKS for words in part(of))),
         pictures=(_picture(name, asked, found, of), *_picture_of_tracks(name, asked, found, of)),
         tables=tuple(_tables(asked, found, of)),
     )
@@ -117,6 +117,15 @@ def _what(of: Thresholds) -> str:
         f"three quarters of the way{noticed}. Numbers are medians with 95 % credible intervals; the means over people "
         "and the pooled values draw people towards each other, the more the less their own answers tell."
     )
+
+
+def _in_one_order(of: Thresholds) -> Iterator[str]:
+    if of.standard_interval != "random":
+        yield (
+            f"The standard was always in the {of.standard_interval} interval, so the {_measure(of)} holds what the "
+            "order does to a comparison (the time-order error) and any lean to an answer: a distance from the standard "
+            "is not of the levels alone."
+        )
 
 
 def _of_a_walk(of: Thresholds) -> Iterator[str]:
@@ -181,6 +190,17 @@ def _at_edge(of: Thresholds) -> Iterator[str]:
             f"{of.at_edge:,} of {how_many(trials, 'trial')} had a level at an end of those that there were, beyond "
             "which the procedure may have gone (flag at-edge): if that is often, the levels end too soon."
         )
+
+
+_REMARKS: tuple[Callable[[Thresholds], Iterator[str]], ...] = (
+    _in_one_order,
+    _who,
+    _without,
+    _below_zero,
+    _at_edge,
+    _of_a_walk,
+)
+"""What is to be said of some functions, in this order; most has nothing to say."""
 
 
 def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Picture:
