@@ -20,7 +20,7 @@ CHANGES = 200
 
 
 @pytest.fixture(scope="module")
-def export_archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("archived")
     archive_export.export_archive(ArchiveRequest(folder=small_study(folder / "study"), out=folder / "archive"))
     return folder / "archive"
