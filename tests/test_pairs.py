@@ -61,7 +61,7 @@ def test_a_third_answer_is_a_tie_and_half_a_choice(config: DesignConfig, table: 
     assert one.pairs is not None
     assert sum(map(sum, one.pairs.conditions[0].ties)) == 2 * len(table)
     assert one.preferred is not None
-    assert {cell.mean for cell in one.preferred} == {0.5}
+    assert {cell.mean for cell in (*one.preferred, *one.cells)} == {0.5}
     some = table["rather"].where(np.arange(len(table)) % 4 > 0, "neither")
     scores = summarise(three, table.assign(rather=some)).questions["rather"].pairs
     assert scores is not None
@@ -105,7 +105,7 @@ def test_the_pages_have_scores_of_both_models_and_everybodys_circles(
 def test_that_a_tie_counts_as_half_a_choice_is_said_where_there_may_be_one(
     config: DesignConfig, table: pd.DataFrame
 ) -> None:
-    """The table of scores counts choices alone, and so has other shares."""
+    """The table of scores counts choices and ties apart."""
     values = config.model_dump()
     values["questions"]["rather"] |= {"answers": ("first", "second", "neither"), "keys": {}}
     some = table["rather"].where(np.arange(len(table)) % 4 > 0, "neither")
@@ -120,6 +120,9 @@ def test_that_a_tie_counts_as_half_a_choice_is_said_where_there_may_be_one(
             ReportData(title="T", statistics=StudyStatistics(designs={"pairs": summary}))
         )
         assert section.tables[0].caption == f"rather: how often each was chosen{said}, by condition"
+        assert f"Share of first{said}" in section.tables[1].header
+        (of_pairs,) = pair_sections("pairs", summary)
+        assert ("Tied" in of_pairs.tables[0].header) == bool(said)
         drawn = "Drawn is how often each was chosen, a tie as half (rather)."
         assert (drawn in section.pictures[0].caption) == bool(said)
 

@@ -114,12 +114,18 @@ class QuestionScores:
 def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> QuestionScores:
     """The scores of a question, trial by trial and person by person."""
     column = correct_columns(design.questions).get(name, name)
-    scored = table.assign(score=answer_scores(design.questions[name], table[column])).dropna(subset=["score"])
+    scores = answer_scores(design.questions[name], table[column], of_pair=_of_pair(design, name))
+    scored = table.assign(score=scores).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
     people = _complete(design, real)
     tested = real["participant_id"] if design.trial.kind == "pair" else people.index  # pairs have scores, and no tests
     left_out = sorted({*table["participant_id"].astype(str)} - {*tested.astype(str)})
     return QuestionScores(scored=scored, real=real, people=people, left_out=tuple(left_out))
+
+
+def _of_pair(design: DesignConfig, name: str) -> bool:
+    """Whether an answer chooses between the two of a pair; what is asked after a block is of no trial."""
+    return design.trial.kind == "pair" and design.questions[name].when != "block"
 
 
 def _question(design: DesignConfig, name: str, question: QuestionConfig, table: pd.DataFrame) -> QuestionSummary:
@@ -139,7 +145,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         tests=tests,
         left_out=found.left_out,
         chance=chance(question),
-        preferred=_preferred(design, name, question, scored),
+        preferred=_preferred(design, question, scored) if _of_pair(design, name) else None,
         scale=_scale(question),
         held=_is_held(design, question),
         not_above_0=_not_above_0(question, table[name]),
@@ -205,26 +211,18 @@ def _levels(design: DesignConfig, rows: pd.DataFrame) -> dict[str, Level]:
 
 
 def _preferred(
-    design: DesignConfig, name: str, question: QuestionConfig, scored: pd.DataFrame
+    design: DesignConfig, question: QuestionConfig, scored: pd.DataFrame
 ) -> tuple[ConditionSummary, ...] | None:
     """How often each level of a pair was chosen: in the mean over people, of all their trials that had it.
 
     `None`, too, where a procedure chose the pairs: a level that met its equals alone is chosen half the time.
     """
     compared = design.trial.compare
-    if (
-        design.trial.kind != "pair"
-        or design.adapted
-        or compared is None
-        or question.kind != "choice"
-        or question.correct is not None
-    ):
+    if design.adapted or compared is None or question.kind != "choice" or question.correct is not None:
         return None
-    tied = ~scored[name].isin(question.answers[:2])
-    chosen = scored["score"].where(~tied, 0.5)  # of neither
+    first = scored["score"]
     halves = [
-        scored.assign(level=scored[f"{compared}_{place}"], score=chosen if place == 1 else 1 - chosen)
-        for place in (1, 2)
+        scored.assign(level=scored[f"{compared}_{place}"], score=first if place == 1 else 1 - first) for place in (1, 2)
     ]
     both = pd.concat(halves)
     return _ordered_levels(design.factors[compared].all_levels, compared, both)
@@ -245,8 +243,8 @@ def _ordered_levels(levels: Sequence[Level], name: str, rows: pd.DataFrame) -> t
     return tuple(found)
 
 
-def answer_scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
-    """The answers as numbers; NaN for none. An unscored choice: 1 for the first answer."""
+def answer_scores(question: QuestionConfig, column: pd.Series, *, of_pair: bool = False) -> FloatArray:
+    """The answers as numbers; NaN for none. An unscored choice: 1 for the first answer, 0.5 for a tie of a pair."""
     if question.kind in {"rating", "ranking"} or question.correct is not None:
         return pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
     if question.kind == "number":
@@ -254,7 +252,9 @@ def answer_scores(question: QuestionConfig, column: pd.Series) -> FloatArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(numbers > 0, np.log(numbers), np.nan)
     given = column.isin(question.named_answers)
-    return np.where(given, (column == question.named_answers[0]).to_numpy(dtype=np.float64), np.nan)
+    first = (column == question.named_answers[0]).to_numpy(dtype=np.float64)
+    tied = of_pair & ~column.isin(question.named_answers[:2])
+    return np.where(given, np.where(tied, 0.5, first), np.nan)
 
 
 def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.DataFrame]:

@@ -114,12 +114,14 @@ def _mean_word(question: QuestionSummary) -> str:
     if question.preferred:
         return f"chosen, in the mean over people{_tie(question)}"
     words = {"number": "geometric means", "ranking": "mean ranks"}
-    return f"share of {question.label(question.counted)}" if question.counted else words.get(question.kind, "means")
+    if question.counted:
+        return f"share of {question.label(question.counted)}{_tie(question)}"
+    return words.get(question.kind, "means")
 
 
 def _tie(question: QuestionSummary) -> str:
     """How a third answer of a pair, a tie, counts for the two; empty where there is none."""
-    return ", a tie as half" if question.preferred and len(question.cells[0].answers or ()) > 2 else ""
+    return ", a tie as half" if question.pairs is not None and len(question.cells[0].answers or ()) > 2 else ""
 
 
 def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
@@ -365,7 +367,7 @@ def _conditions(found: DesignSummary, name: str, question: QuestionSummary) -> T
         )
         for cell in question.cells
     )
-    first = f"Share of {question.label(question.counted)}" if question.counted else "Chosen"
+    first = f"Share of {question.label(question.counted)}{_tie(question)}" if question.counted else "Chosen"
     mean = {"number": "Geometric mean", "choice": first, "yes-no": first}.get(question.kind, "Mean")
     right = "Hits (of catch trials: correct rejections)" if question.detected else "Right"
     kind = ["Trials were"] if caught else []

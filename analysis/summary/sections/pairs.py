@@ -114,12 +114,14 @@ def _tables(asked: str, found: DesignSummary, of: PairedComparison) -> Iterator[
 def _scores(caption: str, found: DesignSummary, of: PairedComparison, condition: PairCondition) -> Table:
     one, other = condition.scores
     thurstone = other.scores or (None,) * len(one.scores)
+    tied = any(map(any, condition.ties))
     words = factor_words(of.factor)
     return Table(
         caption=caption,
         header=(
             f"{words[:1].upper()}{words[1:]}",
             "Chosen",
+            *(["Tied"] if tied else []),
             "Of",
             "Bradley–Terry",
             "95 % interval",
@@ -130,6 +132,7 @@ def _scores(caption: str, found: DesignSummary, of: PairedComparison, condition:
             (
                 _item(found, of, str(first.item)),
                 f"{sum(condition.wins[place]):,}",
+                *([f"{sum(condition.ties[place]):,}"] if tied else []),
                 f"{_compared(condition, place):,}",
                 apa.number(first.score),
                 apa.interval(first.low, first.high),
