@@ -17,6 +17,7 @@ from analysis.report.figures import style
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.figures.designs import figure_design
+from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
@@ -31,9 +32,13 @@ from tests.designs import design
 VOLTS = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
 
 
-def tables_of(found):
+def section_of(found):
     (section, *_) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
-    return section.tables
+    return section
+
+
+def tables_of(found):
+    return section_of(found).tables
 
 
 def detection(factors, **more):
@@ -388,3 +393,37 @@ def test_reversals_of_an_up_down_track_are_ringed_and_explained_and_of_other_lev
     assert any("`recoil power` of this design says by how much" in text for text in section.paragraphs)
     fixed = summarise(config, pd.DataFrame(rows).assign(pulse_s=[0.002, *[0.008] * 9]))
     assert [track.reversals for track in fixed.questions["interval"].thresholds.tracks] == [()]
+
+
+@pytest.mark.parametrize("varied", [{}, {"grip": {"levels": ["one", "two"], "between": True}}])
+def test_a_figure_of_hits_has_the_false_alarms_beside_them(varied, tmp_path, monkeypatch):
+    grips = {"P1": "one", "P2": "two"}
+    table = answered(SAID)
+    found = summarise(detection(VOLTS | varied), table.assign(grip=table["participant_id"].map(grips)))
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(found, tmp_path / "figure")
+    (axes,) = drawn[0].axes
+    handles, names = axes.get_legend_handles_labels()
+    lines = {name: line for name, line in zip(names, handles, strict=True) if "false alarms" in name}
+    shares = {"false alarms, one": 1 / 12, "false alarms, two": 2 / 12} if varied else {"false alarms": 3 / 24}
+    assert {name: line.get_ydata()[0] / 100 for name, line in lines.items()} == pytest.approx(shares)
+    assert len({line.get_linestyle() for line in axes.lines if line.get_linestyle() != "None"}) > len(lines)
+    assert axes.get_ylabel() == "hits and false alarms [%]"
+    (picture,) = section_of(found).pictures
+    assert "Drawn is the share of hits and of false alarms in catch trials (felt)." in picture.caption
+    assert all(f"{name}, catch trials {apa.percent(share)}" in picture.alt for name, share in shares.items())
+
+
+@pytest.mark.slow
+def test_a_figure_of_functions_of_yes_has_the_false_alarms(tmp_path, monkeypatch):
+    said = {(one, volts): (yes, 24) for one in ("P1", "P2") for volts, yes in ((6.0, 4), (8.0, 12), (10.0, 22))}
+    rows = answered(said | {("P1", None): (3, 12), ("P2", None): (6, 12)})
+    found = summarise(detection(VOLTS | {"voltage_V": {"levels": [6.0, 8.0, 10.0]}}), rows)
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_functions(found, found.questions["felt"].thresholds, tmp_path / "figure")
+    for axes, share in zip(drawn[0].axes, (9 / 24, 3 / 12, 6 / 12), strict=True):
+        assert 100 * share in [line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1]
+    (section,) = threshold_sections("test", found)
+    assert "Dashed: false alarms in catch trials." in section.pictures[0].caption

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from analysis.report.serial import OPTIONAL, UNWRITTEN
 from analysis.summary.pairs import PairedComparison
@@ -58,6 +58,13 @@ class DesignTest:
     reason: str | None = None
 
 
+def _of_errors(cell: ConditionSummary) -> ConditionSummary:
+    """A condition of scored answers with those that are wrong in the place of the right ones."""
+    if cell.right is None or cell.ci_low is None or cell.ci_high is None:
+        return cell
+    return replace(cell, right=cell.trials - cell.right, ci_low=1.0 - cell.ci_high, ci_high=1.0 - cell.ci_low)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionSummary:
     """All that one question gave. `left_out`: who has no score in some condition, and so is in no test.
@@ -95,6 +102,12 @@ class QuestionSummary:
         """The conditions of its picture: of pairs each item, and no catch trials beside others."""
         cells = self.preferred or self.cells
         return tuple(cell for cell in cells if not cell.catch) or cells
+
+    @property
+    def false_alarms(self) -> tuple[ConditionSummary, ...]:
+        """The catch trials beside others: `right` is how often a stimulus was said to be there."""
+        caught = [cell for cell in self.cells if cell.catch] if self.detected else []
+        return tuple(_of_errors(cell) for cell in caught if len(caught) < len(self.cells))
 
     @property
     def detected(self) -> bool:

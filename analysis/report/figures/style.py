@@ -29,7 +29,7 @@ from experiments.record.storage import errors_name
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
 INDIGO, WINE, OLIVE = "#332288", "#882255", "#999933"
-INK = "#333333"
+INK, GREY = "#333333", "#666666"
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INDIGO, OLIVE, WINE, YELLOW)
 """Okabe and Ito 2008, told apart with any common colour vision, those that stand out most from white first; between
 them three of Tol 2021 for the seventh to the ninth."""
@@ -333,9 +333,9 @@ def bounded(axes: Axes, low: float, high: float) -> None:
     axes.spines["left"].set_bounds(low, high)
 
 
-def reference_line(axes: Axes, height: float, text: str) -> None:
+def reference_line(axes: Axes, height: float, text: str, colour: str = GREY) -> None:
     """A dashed line across, named at its right."""
-    axes.axhline(height, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    axes.axhline(height, color=colour, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     axes.annotate(
         text,
         xy=(1.0, height),

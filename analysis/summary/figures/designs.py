@@ -33,6 +33,7 @@ from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words
 
 _ACROSS = 2
+_ALARMS = "false alarms"
 _LEGEND_COLUMNS = 3
 _TICKS = 10
 """So many levels have a tick each."""
@@ -101,13 +102,20 @@ def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary
     cells = [cell for cell in question.pictured if factor is None or factor in cell.levels]
     places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
     numeric = all(isinstance(level, float) for level in places)
-    series = _series(cells, factor, found)
+    alarms = question.false_alarms
+    aside = [cell for cell in alarms if factor is None or factor in cell.levels]
+    series = _series(cells, factor, found, "hits" if alarms else "")
+    series |= _series(aside, factor, found, _ALARMS)
     logarithmic = question.kind == "number" and numeric and min(places.values()) > 0
     for i, (label, some) in enumerate(series.items()):
         marks = sorted(_marks(question, some, factor, places), key=lambda mark: mark.x)
-        aside = i - (len(series) - 1) / 2  # marks and bars of several series would hide each other
-        shifted = [replace(mark, x=_shifted(mark.x, aside, [*places.values()], numeric, logarithmic)) for mark in marks]
+        off = i - (len(series) - 1) / 2  # marks and bars of several series would hide each other
+        shifted = [replace(mark, x=_shifted(mark.x, off, [*places.values()], numeric, logarithmic)) for mark in marks]
         _draw_series(axes, shifted, i, label, joined=numeric)
+    across = [] if aside else alarms  # catch trials that have no level along the axis
+    for i, (label, (cell,)) in enumerate(_series(across, factor, found, _ALARMS).items(), start=len(series)):
+        share = 100 * (cell.right or 0) / cell.trials
+        axes.axhline(share, color=method_colour(i), linestyle=method_line(i), linewidth=1.2, label=label)
     if question.kind == "number":
         _logarithmic(axes, both=logarithmic)
     labels = found.labels.get(factor or "", {})
@@ -125,13 +133,13 @@ def _places(levels: Sequence[Level]) -> dict[Level, float]:
 
 
 def _series(
-    cells: Sequence[ConditionSummary], factor: str | None, design: DesignSummary
+    cells: Sequence[ConditionSummary], factor: str | None, design: DesignSummary, what: str
 ) -> dict[str, list[ConditionSummary]]:
-    """The conditions by the levels of the other factors."""
+    """The conditions by `what` they show and the levels of the other factors."""
     found: dict[str, list[ConditionSummary]] = {}
     for cell in cells:
         others = [drawn_name(design.label(name, level)) for name, level in cell.levels.items() if name != factor]
-        found.setdefault(", ".join(others), []).append(cell)
+        found.setdefault(", ".join(filter(None, [what, *others])), []).append(cell)
     return found
 
 
@@ -205,7 +213,8 @@ def _numbered(value: float) -> str:
 
 def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None) -> None:
     scored = any(cell.right is not None for cell in question.cells)
-    of = "hits" if question.detected else "right" if scored else "chosen"
+    hits = f"hits and {_ALARMS}" if question.false_alarms else "hits"
+    of = hits if question.detected else "right" if scored else "chosen"
     counted = question.counted or ""
     label = question.label(counted)
     share = f"share of {drawn_name(label if is_drawable(label) else counted)} [%]" if counted else f"{of} [%]"

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from analysis.psychometric.fit import Credible
-from analysis.psychometric.people import ShareAtLevel, mean_curve
+from analysis.psychometric.people import PersonFit, ShareAtLevel, mean_curve
 from analysis.report.figures.style import (
+    GREY,
     drawn,
     drawn_name,
     have_room,
@@ -50,11 +51,15 @@ _LABELS = {"right": "right [%]", "yes": "yes [%]", "chosen": "chosen over the st
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Curve:
-    """What one panel shows of one condition: points, a curve with its band, and a threshold with its interval."""
+    """What one panel shows of one condition: points, a curve with its band, a threshold with its interval.
+
+    `alarms`: the share of yes in catch trials.
+    """
 
     points: tuple[ShareAtLevel, ...]
     shares: tuple[FloatArray, FloatArray, FloatArray] | None
     threshold: Credible | None
+    alarms: float | None
 
 
 def figure_functions(found: DesignSummary, of: Thresholds, path_stem: Path) -> None:
@@ -82,9 +87,15 @@ def _span(of: Thresholds) -> tuple[float, float]:
 def _own(condition: ConditionFit, who: str, levels: FloatArray) -> _Curve:
     one = next((one for one in condition.people if one.participant == who), None)
     if one is None or one.fit is None:
-        return _Curve(points=() if one is None else one.points, shares=None, threshold=None)
+        points = () if one is None else one.points
+        return _Curve(points=points, shares=None, threshold=None, alarms=_alarms([one] if one else []))
     within = one.fit.threshold if one.fit.where == "within" else None
-    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within)
+    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within, alarms=_alarms([one]))
+
+
+def _alarms(people: Sequence[PersonFit]) -> float | None:
+    caught = [one.catch for one in people if one.catch is not None]
+    return sum(yes for yes, _ in caught) / sum(trials for _, trials in caught) if caught else None
 
 
 def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
@@ -95,12 +106,16 @@ def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
         points=condition.points,
         shares=mean_curve(fits, levels) if fits else None,
         threshold=None if group is None else group.threshold,
+        alarms=_alarms(condition.people),
     )
 
 
 def _draw(axes: Axes, curves: Sequence[_Curve], levels: FloatArray) -> None:
     light_grid(axes)
     apart = (levels[-1] - levels[0]) * min(_ASIDE, _ALL_ASIDE / max(1, len(curves) - 1))
+    alarms = {curve.alarms: method_colour(i) for i, curve in enumerate(curves) if curve.alarms is not None}
+    for share, colour in alarms.items():
+        reference_line(axes, 100 * share, "", colour if len(alarms) > 1 else GREY)
     for i, curve in enumerate(curves):
         colour, aside = method_colour(i), apart * (i - (len(curves) - 1) / 2)  # marks of several would hide each other
         if curve.shares is not None:

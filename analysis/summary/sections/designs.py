@@ -273,6 +273,8 @@ def _picture(name: str, found: DesignSummary) -> Picture:
 def _drawn_words(question: QuestionSummary) -> str:
     """What a picture's marks count, where its axis does not say it; else empty."""
     tie = _tie(question)
+    if question.false_alarms:
+        return "the share of hits and of false alarms in catch trials"
     if question.counted:
         return f"the share of {question.label(question.counted)}"
     return f"how often each was chosen{tie}" if tie else ""
@@ -299,7 +301,8 @@ def _means(found: DesignSummary, question: QuestionSummary) -> str:
     cells = question.pictured
     told = [f"{_condition(found, cell)} {_mean(question, cell)}" for cell in cells[:_SPELLED_OUT]]
     more = len(cells) - len(told)
-    return ", ".join(told) + (f" and {more} more conditions" if more else "")
+    alarms = [f"false alarms, {_condition(found, cell)} {_mean(question, cell)}" for cell in question.false_alarms]
+    return "; ".join([", ".join(told) + (f" and {more} more conditions" if more else ""), *alarms])
 
 
 _WITH_STIMULUS = "trials with a stimulus"

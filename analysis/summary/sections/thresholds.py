@@ -207,7 +207,9 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
     people = list(dict.fromkeys(one.participant for condition in of.conditions for one in condition.people))
     more = len(people) - MOST_PANELS
     rest = f" {more:,} more people have no panel; their numbers are in the table." if more > 0 else ""
-    dashed = "the standard" if of.share == "chosen" else "chance" if of.guess is not None else ""
+    caught = any(one.catch is not None for condition in of.conditions for one in condition.people)
+    unknown = "false alarms in catch trials" if caught else ""
+    dashed = "the standard" if of.share == "chosen" else "chance" if of.guess is not None else unknown
     group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
     aside = ", those of one level side by side" if len(of.conditions) > 1 else ""
     caption = (
