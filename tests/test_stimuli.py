@@ -152,3 +152,12 @@ def test_a_hand_sets_numbers_that_the_model_is_told_or_that_are_called_otherwise
 def test_below_break_away_is_listed_where_the_design_asks_for_it(gun):
     config = design(below_break_away=True, factors={"method": STRONG, "voltage_V": {"levels": [0.5, 16.0]}})
     assert [one.status for one in stimuli.limits(config, gun)] == ["no-break-away", "home"]
+
+
+@pytest.mark.parametrize(("standard", "shown"), [(12.0, [8.0, 16.0, 12.0]), (16.0, [8.0, 16.0])])
+def test_a_standard_stands_once_behind_the_levels_that_are_told_from_it(gun, standard, shown):
+    factors = {"voltage_V": {"levels": [8.0, 16.0]}, "method": STRONG}
+    trial = {"kind": "two-interval", "compare": "voltage_V", "standard": standard}
+    asked = {"kind": "choice", "text": "?", "answers": ["first", "second"], "correct": "larger"}
+    config = design(factors=factors, trial=trial, questions={"q": asked})
+    assert [cell.drive.voltage_V for cell in stimuli.limits(config, gun)] == shown

@@ -148,7 +148,7 @@ def _name(found: IntervalStimulus, gun: GunConfig, number: int) -> str:
 
 
 def _with(levels: Condition, name: str, level: Level) -> Condition:
-    return (*(pair for pair in levels if pair[0] != name), (name, level))
+    return tuple((one, level if one == name else old) for one, old in levels)
 
 
 def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> IntervalStimulus:
@@ -267,12 +267,11 @@ def _shot_cells(design: DesignConfig) -> Iterator[Condition]:
         if name not in design.between and name not in (DIRECTION_FACTOR, INSTRUCTION_FACTOR)
     ]
     for given in groups(design):
-        for cell in cells(design, names, given):
-            levels = (*given, *cell)
-            yield levels
-            standard = design.trial.standard
-            if standard is not None and standard != EMPTY and design.trial.compare is not None:
-                yield _with(levels, design.trial.compare, standard)
+        found = [(*given, *cell) for cell in cells(design, names, given)]
+        yield from found
+        standard = design.trial.standard
+        if standard is not None and standard != EMPTY and design.trial.compare is not None:
+            yield from (_with(levels, design.trial.compare, standard) for levels in found)
 
 
 def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> ConditionLimits:
