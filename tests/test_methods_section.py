@@ -104,6 +104,7 @@ def test_the_trials_of_one_track_are_told_once():
             "2 sessions, each of one damper, in an order balanced over participants by a Latin square.",
         ),
         ("pairs", "that differed in method: all pairs"),
+        ("grip", "varied between participants. Grip was shown to the experimenter, who confirmed it."),
         ("grip", "Grip (one hand, two hands) varied between participants."),
         ("hurry", "Instruction was constant in a set."),
     ],

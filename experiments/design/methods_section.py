@@ -62,9 +62,17 @@ def _factors(design: DesignConfig) -> Iterator[str]:
         yield f"{_sentence(design, between)} varied between participants."
     if constant:
         yield f"{_sentence(design, constant)} was the same in all trials."
-    hands = [name for name in by_hand(design) if len(design.factors[name].all_levels) > 1]
-    if hands:
+    yield from _by_experimenter(design)
+
+
+def _by_experimenter(design: DesignConfig) -> Iterator[str]:
+    """What no command to the gun varies: a hand sets what changes the gun; the rest may be a posture, or a day."""
+    varied = [name for name in by_hand(design) if len(design.factors[name].all_levels) > 1]
+    if hands := [factor_words(name) for name in varied if design.factors[name].sets]:
         yield f"The experimenter set {joined_by_and(hands)} by hand."
+    if shown := [factor_words(name) for name in varied if not design.factors[name].sets]:
+        text, (was, them) = joined_by_and(shown), ("was", "it") if len(shown) == 1 else ("were", "them")
+        yield f"{text[0].upper() + text[1:]} {was} shown to the experimenter, who confirmed {them}."
 
 
 def _chosen(design: DesignConfig, table: AdaptiveConfig) -> Iterator[str]:
