@@ -125,6 +125,16 @@ def test_what_synthetic_people_are_given_for_nothing_that_there_is_is_a_warning_
     assert "asymmetric-2/backward" in backward
 
 
+@pytest.mark.parametrize(("threshold", "said"), [(4.0, True), (4e-6, True), (0.04, False), (0.004, False)])
+def test_a_threshold_of_synthetic_people_in_another_unit_is_a_warning_with_its_line(tmp_path, threshold, said):
+    path = written(tmp_path, "detection", ('"synthetic/detection.toml"', '"own.toml"'))
+    law = f'law = "psychometric"\nfactor = "pulse_s"\nspread = 0.2\nthreshold = {threshold}\n'
+    (tmp_path / "own.toml").write_text(f"[questions.felt]\n{law}")
+    told = f"{tmp_path / 'own.toml'}:5: questions.felt.threshold = {threshold:g}: the levels of pulse_s are 0.003 to "
+    warned = [one for one in check(path, None, 1).warnings if "give the threshold in the unit of the levels" in one]
+    assert [one.startswith(told) for one in warned] == [True] * said
+
+
 @pytest.mark.slow
 def test_what_synthetic_people_do_in_a_practice_without_instructions_is_given_for_something(tmp_path):
     """Of `by` with the instruction a practice has the method alone: without a value nobody could practise."""

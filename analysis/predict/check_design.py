@@ -37,7 +37,7 @@ from experiments.design.stimuli import ConditionLimits, limits, settings, stimul
 from experiments.load import check_limits, language_key
 from experiments.study.preregistration import FreezeStatus
 from experiments.synthetic.answers import synthetic_participant_of
-from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, superfluous
+from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, far_thresholds, superfluous
 from experiments.synthetic.model_based import NEUTRAL, rates_by_instruction
 from experiments.tasks.questions import mistaken_keys
 
@@ -119,7 +119,7 @@ def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) ->
         warnings=(
             *_warnings(design, planned, [*plans.values()], cells, shaken),
             *_without_catalogue(setup),
-            *_superfluous(setup),
+            *_of_people(setup),
         ),
         assumed=(
             *design.assumed,
@@ -137,13 +137,14 @@ def _without_catalogue(setup: Setup[DesignConfig]) -> Iterator[str]:
         yield str(error)
 
 
-def _superfluous(setup: Setup[DesignConfig]) -> Iterator[str]:
-    """What the file of the synthetic people says of nothing that there is, with its line."""
+def _of_people(setup: Setup[DesignConfig]) -> Iterator[str]:
+    """What the file of the synthetic people says of nothing that there is, or far from it, with its line."""
     if isinstance(setup.laws, SyntheticAnswers):
         people, design = setup.source.parent / str(setup.config.synthetic), setup.config
         practised = range(len(groups(design))) if design.practice.repetitions else ()
         plans = (*plans_of_groups(design), *(practice_of(design, "P", 0, group=group) for group in practised))
-        yield from (at_key(people, one) for one in superfluous(design, setup.laws, plans))
+        found = (*superfluous(design, setup.laws, plans), *far_thresholds(design, setup.laws))
+        yield from (at_key(people, one) for one in found)
 
 
 def _felt(setup: Setup[DesignConfig], plan: Plan) -> dict[str, dict[str, float]]:

@@ -290,6 +290,23 @@ def superfluous(design: DesignConfig, laws: SyntheticAnswers, plans: Iterable[Pl
                     yield f'questions.{name}.{place}."{cell}": nobody meets that; {design.design} has {there}'
 
 
+_FAR = 10.0
+"""A threshold so many times beyond all levels is most likely in another unit (assumed)."""
+
+
+def far_thresholds(design: DesignConfig, laws: SyntheticAnswers) -> Iterator[str]:
+    """The thresholds that no level is near."""
+    for name, law in laws.questions.items():
+        if not isinstance(law, PsychometricLaw) or design.questions[name].correct == "larger":
+            continue
+        levels = [level for level in design.factors[law.factor].all_levels if isinstance(level, float) and level > 0]
+        if levels and not min(levels) / _FAR <= law.threshold <= max(levels) * _FAR:
+            yield (
+                f"questions.{name}.threshold = {law.threshold:g}: the levels of {law.factor} are {min(levels):g} to "
+                f"{max(levels):g}, so people answer alike at all of them; give the threshold in the unit of the levels"
+            )
+
+
 def _problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Iterator[str]:
     common = [*_common_problems(design, question, law)]
     if common:
