@@ -156,6 +156,25 @@ def test_groups_of_people_do_not_hide_the_exponent_of_their_numbers():
     assert (exponent.name, exponent.statistic) == ("exponent", pytest.approx(1.0))
 
 
+def test_several_factors_between_people_do_not_hide_the_exponent_of_their_numbers():
+    between = {name: {"levels": ["x", "y"], "between": True} for name in ("hand", "coat")}
+    factors = {"method": {"levels": ["a"]}, "pulse_s": {"levels": [0.004, 0.008, 0.016]}} | between
+    config = design(factors=factors, questions={"q": {"kind": "number", "text": "?"}})
+    powers = {("x", "x"): 0.5, ("x", "y"): 0.9, ("y", "x"): 1.0, ("y", "y"): 1.6}
+    rows = [
+        (f"P{hand}{coat}", hand, coat, "a", s, 40 * s**power)
+        for (hand, coat), power in powers.items()
+        for s in (0.004, 0.008, 0.016)
+    ]
+    table = pd.DataFrame(rows, columns=["participant_id", "hand", "coat", "method", "pulse_s", "q"])
+    exponent, anova = summarise(config, table).questions["q"].tests
+    assert (exponent.name, exponent.statistic) == ("exponent", pytest.approx(1.0))
+    assert "several factors between people" in anova.reason
+    assert names_of_tests(config, config.questions["q"]) == ("exponent",)
+    alone = summarise(config, table[table["participant_id"] == "Pxx"])
+    assert "No power-law exponent over pulse in s: fewer than two people" in next(result_sentences("test", alone))
+
+
 def test_ranks_have_their_degrees_of_freedom_their_people_and_their_agreement():
     factors = {"method": {"levels": ["a", "b", "c"]}}
     question = {"kind": "rating", "text": "?", "minimum": 0, "maximum": 10, "grain": 1}

@@ -298,7 +298,7 @@ def test_nested_levels_have_no_exponent_and_the_report_says_why():
         for voltage in voltages
     ]
     found = summarise(config, pd.DataFrame(rows, columns=["participant_id", "method", "voltage_V", "q"]))
-    _, exponent = found.questions["q"].tests
+    exponent, _ = found.questions["q"].tests
     assert (exponent.name, exponent.effect, exponent.statistic) == ("exponent", "voltage_V", None)
     (said,) = result_sentences("test", found)
     assert "No power-law exponent over voltage in V: factors are nested, so the means over its levels can" in said

@@ -29,10 +29,10 @@ def names_of_tests(design: DesignConfig, question: QuestionConfig) -> tuple[Test
 
 def _comparisons(design: DesignConfig, question: QuestionConfig) -> Iterator[TestName]:
     within = _within(design)
+    if question.kind == "number" and _powers(design) and not _of_other_conditions(design, within):
+        yield "exponent"
     if _is_described(design, question, within):
         return
-    if question.kind == "number" and _powers(design):
-        yield "exponent"
     if len(within) != 1 or (design.between and question.kind != "ranking"):
         yield "anova"
         return
@@ -57,12 +57,19 @@ def _within(design: DesignConfig) -> list[str]:
 def _is_described(design: DesignConfig, question: QuestionConfig, within: list[str]) -> bool:
     """Whether the conditions of a question are described, not tested."""
     return (
-        design.trial.kind == "pair"
+        _of_other_conditions(design, within)
         or not (within or design.between)
         or (question.kind == "ranking" and len(within) > 1)
         or (question.correct is None and len(question.named_answers) > 2)
         or len(design.between) > 1
         or len(within) > MOST_FACTORS
+    )
+
+
+def _of_other_conditions(design: DesignConfig, within: list[str]) -> bool:
+    """Whether conditions differ in more than their own levels: pairs, nested factors, levels that answers chose."""
+    return (
+        design.trial.kind == "pair"
         or any(factor.within is not None for factor in design.factors.values())
         or bool(with_levels_of_their_own(design, (*design.between, *within)))
     )

@@ -30,14 +30,11 @@ def condition_tests(
     names = [str(name) for name in people.columns.names if name is not None]
     if not (names or design.between):
         return
+    if question.kind == "number" and not with_levels_of_their_own(design, (*design.between, *names)):
+        yield from (_exponent(name, people) for name in _powers(people))
     if why := _untested(design, question, people):
         yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
-        if question.kind == "number" and _is_nested(people):
-            yield from (DesignTest(name="exponent", effect=name, reason=_OTHERS_DIFFER) for name in _powers(people))
-        return
-    if question.kind == "number":
-        yield from (_exponent(name, people.T.groupby(level=name).mean().T) for name in _powers(people))
-    if len(names) == 1 and (group is None or question.kind == "ranking"):
+    elif len(names) == 1 and (group is None or question.kind == "ranking"):
         scores = people.to_numpy(dtype=np.float64)
         yield from _one_factor(names[0], scores, question)
         yield from _pairs(scores, [shown_level(level) for level in people.columns], question)
@@ -65,7 +62,10 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
         return f"more than {MOST_FACTORS} factors within people are {instead}"
     if _is_nested(people):
         return f"factors that are nested, not crossed, are {instead}"
-    return "fewer than two people have all conditions" if len(people) < 2 else ""
+    return _TOO_FEW if len(people) < 2 else ""
+
+
+_TOO_FEW = "fewer than two people have all conditions"
 
 
 def _is_nested(people: pd.DataFrame) -> bool:
@@ -181,8 +181,10 @@ def _powers(people: pd.DataFrame) -> list[str]:
 
 def _exponent(name: str, people: pd.DataFrame) -> DesignTest:
     """The mean exponent of the power law: each person's slope of log number over log level, tested against 0."""
-    levels = people.columns.to_numpy(dtype=np.float64)
-    slopes = np.polyfit(np.log(levels), people.to_numpy(dtype=np.float64).T, 1)[0]
+    if why := _OTHERS_DIFFER if _is_nested(people) else _TOO_FEW if len(people) < 2 else "":
+        return DesignTest(name="exponent", effect=name, reason=why)
+    means = people.T.groupby(level=name).mean()
+    slopes = np.polyfit(np.log(means.index.to_numpy(dtype=np.float64)), means.to_numpy(dtype=np.float64), 1)[0]
     test = scipy.stats.ttest_1samp(slopes, 0.0)
     low, high = test.confidence_interval()
     return DesignTest(
