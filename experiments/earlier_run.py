@@ -42,12 +42,13 @@ class UnfinishedRun(PlaceError):  # noqa: N818 - what is there, not what went wr
 class NotAsItBegan(PlaceError):  # noqa: N818 - what is there, not what went wrong
     """An unfinished run that does not go on with what there is now; `refusal` says why, and what it goes on with.
 
-    How to start anew the message says for a command line; a window has a button for it.
+    With which `option` that is given, and how to start anew, the message says for a command line; a window has a button
+    to start anew.
     """
 
-    def __init__(self, before: Contents, refusal: str) -> None:
-        self.refusal = f"{before.path}: {refusal}"
-        super().__init__(f"{self.refusal}, or start anew (--fresh)")
+    def __init__(self, journal: Path, refusal: str, option: str = "") -> None:
+        self.refusal = f"{journal}: {refusal}"
+        super().__init__(f"{self.refusal}{f' ({option})' if option else ''}, or start anew (--fresh)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +160,7 @@ def resumed_plan(before: Contents, request: RunRequest, gun: Gun) -> Plan:
     given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
     if began != now:
         raise NotAsItBegan(
-            before,
+            before.path,
             f"the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
             f"resume with the files it began with, which {given_back} gives back",
         )
@@ -167,31 +168,32 @@ def resumed_plan(before: Contents, request: RunRequest, gun: Gun) -> Plan:
     people = request.setup.laws.model_dump(mode="json") if request.setup.laws is not None else None
     if request.simulated and before.head.laws_json not in (None, people):
         raise NotAsItBegan(
-            before,
+            before.path,
             f"the run began with other synthetic people than {request.setup.config.synthetic} has now; "
             f"resume with those it began with, whom {given_back} gives back",
         )
     _check_same_language(before, request)
-    _check_same_kind_of_gun(before, request, gun)
+    _check_same_kind_of_gun(before, gun)
     if request.seed is not None and request.seed != plan.seed:
         raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
     return plan
 
 
-def _check_same_kind_of_gun(before: Contents, request: RunRequest, gun: Gun) -> None:
+def _check_same_kind_of_gun(before: Contents, gun: Gun) -> None:
     """`PlaceError` if a run would be felt in part: it began on a gun and goes on without one, or on one after."""
     began = before.head.gun
     if began is not None and is_simulated(began.name) != is_simulated(gun.identify().name):
         raise NotAsItBegan(
-            before,
-            f"the run began on {began.name}, and --gun {request.gun} is {gun.identify().name}: one of "
-            "them is simulated, where nothing is felt; resume with the --gun it began with",
+            before.path,
+            f"the run began on {began.name}, and the gun is {gun.identify().name} now: one of them is simulated, where "
+            "nothing is felt; resume with the gun it began with",
+            "--gun",
         )
 
 
 UNMEASURED = (
     "A sensor measured this run until now, and none is named any more: from here on shots are not measured. If they "
-    "are to be, stop, and resume with --sensor."
+    "are to be, stop, and resume with the sensor."
 )
 
 
@@ -205,7 +207,7 @@ def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iter
     if was is not None and was != now:
         yield (
             f"The gun was {_who(was)} until now, and is {_who(now)} from here on. If it is to be the same one, stop, "
-            "and resume with the --gun it had."
+            "and resume with the gun it had."
         )
 
 
@@ -227,33 +229,38 @@ def _check_same_language(before: Contents, request: RunRequest) -> None:
         raise PlaceError(f"{before.path}: the run began in {code}, not in {now.code}; resume with --language {code}")
     if words_shown(request) != (None if began is None else (began.messages, began.texts)):
         raise NotAsItBegan(
-            before,
-            f"the run began with another catalogue {code} than there is now; resume with the one it "
-            "began with (--catalogues DIR)",
+            before.path,
+            f"the run began with another catalogue {code} than there is now; resume with the one it began with",
+            "--catalogues DIR",
         )
 
 
 def language_begun_in(request: RunRequest) -> ShownLanguage | None:
     """The language of the run that is there, by its journal; `None` where it is English, or nothing is on record."""
-    where = folders.place(request.results, request.participant_id, request.setup.config.experiment)
-    head = journal_head(where.journal) if where.journal.exists() else None
+    journal = _journal_of(request)
+    head = journal_head(journal) if journal.exists() else None
     return None if head is None else head.language
+
+
+def _journal_of(request: RunRequest) -> Path:
+    return folders.place(request.results, request.participant_id, request.setup.config.experiment).journal
 
 
 def gone_on_with(request: RunRequest) -> RunRequest:
     """A request that goes on with a run, in that run's language: that it may be used was said when the run began.
 
-    `ConfigError`, if its catalogue is not there any more.
+    Raises as `begun_language`.
     """
     if request.again != "resume":
         return request
     began = language_begun_in(request)
-    return replace(request, language=ENGLISH if began is None else begun_language(began.code, request.catalogues))
+    return replace(request, language=ENGLISH if began is None else begun_language(request, began.code))
 
 
-def begun_language(code: str, folder: Path | None) -> Language:
-    """The language that a run began in. `ConfigError`, if its catalogue is not there any more."""
+def begun_language(request: RunRequest, code: str) -> Language:
+    """The language that a run began in. `NotAsItBegan`, if its catalogue is not there any more."""
     try:
-        return language(code, folder)
+        return language(code, request.catalogues, asked=f"the run began in {code}")
     except ConfigError as error:
-        raise ConfigError(f"the run began in {code}, which it needs to go on (--catalogues DIR). {error}") from error
+        why = f"{error}; resume with the catalogue it began with"
+        raise NotAsItBegan(_journal_of(request), why, "--catalogues DIR") from error

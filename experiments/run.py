@@ -160,7 +160,7 @@ def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Iterator[G
     try:
         gun = open_gun(request.gun, stimuli.methods, clock=clock.now)
     except ValueError as error:
-        raise PlaceError(f"--gun {request.gun}: {error}") from error
+        raise PlaceError(f"gun {request.gun}: {error}") from error
     try:
         yield gun
     except BaseException as why:

@@ -137,7 +137,7 @@ def test_a_run_that_is_refused_when_its_window_is_open_says_why_and_q_closes_it(
 ) -> None:
     with AtConsole([*run_words(quick_configs), "--sensor", "csv:nowhere"], tmp_path, display) as screen:
         screen.stands(RUN)
-        screen.until(lambda look: look.ended and look.says("--sensor csv:nowhere: cannot be opened"))
+        screen.until(lambda look: look.ended and look.says("Sensor csv:nowhere: cannot be opened"))
         screen.keys.press("q")
         code, said = screen.end()
     assert code == 2, said

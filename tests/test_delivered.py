@@ -267,7 +267,7 @@ def test_a_run_without_a_sensor_has_no_table_of_shots(tmp_path: Path):
             "simulated",
             "serial:/dev/none",
             RealClock(),
-            "goes with --gun simulated; it would measure nothing of serial:",
+            "goes with a simulated gun; it would measure nothing of serial:",
         ),
         ("csv:/dev/null", "simulated", VirtualClock(), "measures in real time, and this run's clock is virtual"),
         ("csv:/none/such", "simulated", VirtualClock(), "csv:/none/such: cannot be opened"),

@@ -17,7 +17,7 @@ from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
-from experiments.earlier_run import earlier_run
+from experiments.earlier_run import NotAsItBegan, earlier_run
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.record.replay import go_on, history, replay
@@ -405,7 +405,7 @@ def test_a_fresh_run_whose_sensor_is_refused_leaves_the_unfinished_one_where_it_
     unbroken: dict[str, Unbroken], tmp_path: Path
 ) -> None:
     broken_off(unbroken["preference"], tmp_path, 6)
-    refused_anew(tmp_path, "--sensor csv:nowhere.csv", sensor="csv:nowhere.csv")
+    refused_anew(tmp_path, "sensor csv:nowhere.csv", sensor="csv:nowhere.csv")
 
 
 def test_a_run_that_another_one_took_the_place_of_meanwhile_is_not_set_aside(
@@ -485,8 +485,10 @@ def test_a_run_that_began_on_a_gun_is_not_gone_on_with_where_nothing_is_felt(
     records[0]["gun"] |= {"model": "haptic-gun", "serial": "77"}
     journal.write_bytes(forged(records))
     before = journal.read_bytes()
-    with pytest.raises(PlaceError, match=r"began on haptic-gun:77, and --gun simulated is simulated: .*the --gun it"):
+    said = r"began on haptic-gun:77, .*the gun it began with \(--gun\), or start anew \(--fresh\)"
+    with pytest.raises(NotAsItBegan, match=said) as refused:
         run(request("preference", tmp_path, "resume"), synthetic_screen, VirtualClock())
+    assert " --" not in refused.value.refusal  # which a window says, where there is no command line
     assert journal.read_bytes() == before
 
 

@@ -72,7 +72,7 @@ def measures_by_model(address: str) -> bool:
 def checked_drill(address: str, gun: str) -> SensorDrill:
     """The drill of an address. `SensorError`: it is none, or the gun is one that the model cannot measure."""
     if gun != "simulated":
-        raise SensorError(f"{address}: goes with --gun simulated; it would measure nothing of {gun}")
+        raise SensorError(f"{address}: goes with a simulated gun; it would measure nothing of {gun}")
     return drill_of(address.partition(":")[2])
 
 

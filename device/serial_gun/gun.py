@@ -277,11 +277,11 @@ def find_gun(ports: Iterable[str], serial: str | None = None) -> str:
         return next(iter(found))
     if found:
         guns = ", ".join(f"{named.serial} at {port}" for port, named in found.items())
-        raise LinkError(f"more than one gun answers: {guns}; choose one with --gun serial:PORT")
+        raise LinkError(f"more than one gun answers: {guns}; name the port of one, as serial:PORT")
     wanted = f"gun {serial}" if serial else "gun"
     raise LinkError(
         f"no {wanted} answers; looked at {', '.join(looked) or 'no port: the system shows none'}; "
-        "check power and cable, or name its port with --gun serial:PORT (a twin's is never looked for)"
+        "check power and cable, or name its port, as serial:PORT (a twin's is never looked for)"
     )
 
 

@@ -80,7 +80,7 @@ def language(code: str, folder: Path | None = None, asked: str = "") -> Language
     `asked`: where the code stands, if not behind `--language`.
     """
     if folder is not None and not folder.is_dir():
-        raise ConfigError(f"--catalogues {folder}: no such folder; it must hold LANGUAGE/LC_MESSAGES/{DOMAIN}.po")
+        raise ConfigError(f"{folder}: no such folder of catalogues; it must hold LANGUAGE/LC_MESSAGES/{DOMAIN}.po")
     known = languages(folder)
     if not re.match(LANGUAGE_CODE, code):
         place = asked or f"--language {code!r}"
@@ -89,7 +89,7 @@ def language(code: str, folder: Path | None = None, asked: str = "") -> Language
         where = "" if folder is None else f" here or in {folder}"
         raise ConfigError(
             f"{asked or f'--language {code}'}: no catalogue of that name{where}; there are {', '.join(sorted(known))}; "
-            "docs/howto/languages.md says how to make one, which --catalogues DIR then finds"
+            "docs/howto/languages.md says how to make one, and how it is found"
         )
     path = known[code]
     if path is None:

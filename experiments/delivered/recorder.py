@@ -64,7 +64,7 @@ def open_recorder(
     try:
         end: SensorEnd = SimulatedSensor(address, gun, random) if simulated else SensorLink(address)
     except SensorError as error:
-        raise SensorError(f"--sensor {error}") from error
+        raise SensorError(f"sensor {error}") from error
     recorder = ShotRecorder(end, methods, beside=clock.name != "virtual", again=again)
     try:
         yield recorder
@@ -78,7 +78,7 @@ def _out_of_time(address: str, clock: Clock) -> SensorError:
     try:
         check_address(address)
     except (DeviceError, ValueError) as error:
-        return SensorError(f"--sensor {address}: {error}")
+        return SensorError(f"sensor {address}: {error}")
     return SensorError(
         f"--sensor {address}: measures in real time, and this run's clock is {clock.name}; give --sensor simulated, or "
         "--screen terminal or console with a gun that takes its time (with --screen synthetic none passes)"
