@@ -89,7 +89,7 @@ def test_results_that_are_deleted_under_a_run_are_noticed_and_written_again(
         said = lose_the_results(screen, lambda: shutil.rmtree(tmp_path / "results"))
         screen.close()
     assert "was deleted during the run" in said
-    assert "go on with --resume" in said
+    assert "; resume the run." in said
     check_disarmed(Watch(str(tmp_path)))
     assert answers(tmp_path / f"{DIRECTION}_journal.jsonl") == ["forward"]
     check_resumes(run, tmp_path, display, trial=2)

@@ -232,7 +232,7 @@ class Journal:
             reason = error.strerror if isinstance(error, OSError) else error
             safe = f"everything up to record {self._count - 1} is safe on the disk" if self._count else _NOTHING
             if getattr(error, "errno", None) in storage.DISK_FULL:
-                safe += "; free some space there, then go on with --resume"
+                safe += "; free some space there, then resume the run"
             raise JournalError(f"{self.path}: record {self._count} cannot be written ({reason}); {safe}") from error
         self._synced_s = self._clock.now() if self._each else None
         self._count += len(lines)
@@ -260,11 +260,11 @@ class Journal:
         if unseen is not None:
             lost = f"cannot be looked at any more ({unseen.strerror})"
         if isinstance(unseen, PermissionError):  # it lies there untouched: a copy would only spread it
-            return f"{what} {lost}. {upto} in it; open the folders above it again, then go on with --resume"
+            return f"{what} {lost}. {upto} in it; open the folders above it again, then resume the run"
         data = storage.read_open(self._descriptor, self._length)
         for path in (self.path, Path.cwd() / self.path.name, Path.home() / self.path.name):
             if storage.written_again(path, data):
-                how = "go on with --resume" if path == self.path else f"put it back as {self.path}, then resume"
+                how = "resume the run" if path == self.path else f"put it back as {self.path}, then resume"
                 return f"{what} {lost}. {upto} written again to {path}; {how}"
         return f"{what} {lost}, and cannot be written anywhere else: this run is lost"
 
