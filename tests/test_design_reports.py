@@ -445,4 +445,5 @@ def test_a_figure_of_functions_of_yes_has_the_false_alarms(tmp_path, monkeypatch
     for axes, share in zip(drawn[0].axes, (9 / 24, 3 / 12, 6 / 12), strict=True):
         assert 100 * share in [line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1]
     (section,) = threshold_sections("test", found)
-    assert "Dashed: false alarms in catch trials." in section.pictures[0].caption
+    assert "Dashed: false alarms in catch trials, straight across." in section.pictures[0].caption
+    assert section.pictures[0].alt.endswith(". False alarms: 37.5 %.")

@@ -88,12 +88,13 @@ def _own(condition: ConditionFit, who: str, levels: FloatArray) -> _Curve:
     one = next((one for one in condition.people if one.participant == who), None)
     if one is None or one.fit is None:
         points = () if one is None else one.points
-        return _Curve(points=points, shares=None, threshold=None, alarms=_alarms([one] if one else []))
+        return _Curve(points=points, shares=None, threshold=None, alarms=alarm_share([one] if one else []))
     within = one.fit.threshold if one.fit.where == "within" else None
-    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within, alarms=_alarms([one]))
+    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within, alarms=alarm_share([one]))
 
 
-def _alarms(people: Sequence[PersonFit]) -> float | None:
+def alarm_share(people: Sequence[PersonFit]) -> float | None:
+    """The share of yes in all their catch trials; `None` without any."""
     caught = [one.catch for one in people if one.catch is not None]
     return sum(yes for yes, _ in caught) / sum(trials for _, trials in caught) if caught else None
 
@@ -106,7 +107,7 @@ def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
         points=condition.points,
         shares=mean_curve(fits, levels) if fits else None,
         threshold=None if group is None else group.threshold,
-        alarms=_alarms(condition.people),
+        alarms=alarm_share(condition.people),
     )
 
 

@@ -10,7 +10,7 @@ from analysis.psychometric.people import FEWEST_ANSWERS, GroupFit, PersonFit
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Picture, Section, Table
-from analysis.summary.figures.functions import MOST_PANELS
+from analysis.summary.figures.functions import MOST_PANELS, alarm_share
 from analysis.summary.figures.tracks import MOST_TRACK_PANELS
 from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
@@ -207,8 +207,12 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
     people = list(dict.fromkeys(one.participant for condition in of.conditions for one in condition.people))
     more = len(people) - MOST_PANELS
     rest = f" {more:,} more people have no panel; their numbers are in the table." if more > 0 else ""
-    caught = any(one.catch is not None for condition in of.conditions for one in condition.people)
-    unknown = "false alarms in catch trials" if caught else ""
+    alarms = [
+        f"{_condition(found, one.levels)}{apa.percent(share)}"
+        for one in of.conditions[:_TOLD]
+        if (share := alarm_share(one.people)) is not None
+    ]
+    unknown = "false alarms in catch trials, straight across" if alarms else ""
     dashed = "the standard" if of.share == "chosen" else "chance" if of.guess is not None else unknown
     group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
     aside = ", those of one level side by side" if len(of.conditions) > 1 else ""
@@ -219,6 +223,7 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
         f"it is not within the levels.{f' Dashed: {dashed}.' if dashed else ''}{rest}"
     )
     said = "; ".join(threshold_words(found, of)) or "nobody's fit"
+    said += f". False alarms: {'; '.join(alarms)}" if alarms else ""
     return Picture(
         stem=functions_figure_of(name, asked), caption=caption, alt=f"Psychometric functions. {_measure(of)}: {said}."
     )
