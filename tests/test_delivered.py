@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 from device.methods import paper_methods
 from device.parameters import GunParameters
+from device.physics import hand as physics_of_hand
 from device.physics.hand import HandMechanics, held_acceleration, simulate_held
 from device.sensor.expected import NO_COURSE, expected_shot
 from device.sensor.link import SensorEnd
@@ -180,10 +181,27 @@ def test_a_friction_is_measured_where_the_model_s_own_course_gives_it_and_nowher
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gun", [GunParameters(friction_N=0.02), GunParameters(friction_N=1.12, stiffness_N_m=100.0)])
-def test_a_shot_that_the_model_does_not_bring_to_an_end_is_not_measured_and_ends_no_run(gun: GunParameters):
+def test_a_shot_that_moves_nothing_or_is_not_followed_to_its_end_is_not_measured_and_ends_no_run(
+    monkeypatch: pytest.MonkeyPatch,
+):
     sensor = SimulatedSensor("simulated", "simulated", np.random.default_rng(1))
-    assert sensor.ask(0.0, gun).because == NO_COURSE
+    assert sensor.ask(0.0, GunParameters(friction_N=60.0)).because == NO_COURSE
+    monkeypatch.setattr(physics_of_hand, "_MAX_WORK", 1000)
+    assert sensor.ask(1.0, GunParameters(friction_N=0.22)).because == NO_COURSE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "gun",
+    [
+        GunParameters(friction_N=0.02),
+        GunParameters(friction_N=0.1, voltage_V=18.0),
+        GunParameters(friction_N=1.12, stiffness_N_m=100.0),
+    ],
+)
+def test_a_shot_whose_magnet_hops_after_its_landing_is_measured(gun: GunParameters):
+    sensor = SimulatedSensor("simulated", "simulated", np.random.default_rng(1))
+    assert sensor.ask(0.0, gun).because == ""
 
 
 # beside a run

@@ -126,6 +126,46 @@ def test_a_held_shot_that_is_not_followed_to_its_end_is_said(monkeypatch):
         simulate_held(GunParameters())
 
 
+def test_a_hand_that_takes_too_much_work_is_said(monkeypatch):
+    monkeypatch.setattr(hand, "_MAX_WORK", 500)
+    with pytest.raises(RuntimeError, match="500 evaluations; the hand is too stiff, or the enclosure too light"):
+        simulate_held(GunParameters())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damping_N_s_m", [2.0, 10.0, 40.0])
+@pytest.mark.parametrize("stiffness_N_m", [250.0, 1000.0, 3000.0])
+def test_a_magnet_that_the_braking_current_lifts_off_its_stop_goes_on_in_every_hand(stiffness_N_m, damping_N_s_m):
+    """A hop that is shorter than a step ended where it began, again and again."""
+    for gun in (GunParameters(), GunParameters(friction_N=0.1, voltage_V=18.0), GunParameters(drive_off="open")):
+        held = simulate_held(gun, HandMechanics(stiffness_N_m=stiffness_N_m, damping_N_s_m=damping_N_s_m))
+        assert held.reset_end_s is not None
+        assert abs(held.residual_impulse_Ns) < 1e-9
+
+
+def test_a_held_shot_is_that_of_another_program():
+    """Which held the magnet after it landed, integrated by itself; the last digits are as it was told."""
+    held = simulate_held(GunParameters(), HandMechanics(stiffness_N_m=1000.0))
+    assert held.peak_hand_force_N == pytest.approx(5.6411, abs=1e-4)
+    assert held.peak_kick_m == pytest.approx(4.0639e-3, abs=1e-7)
+    assert held.reset_end_s == pytest.approx(0.142006, abs=1e-6)
+    assert held.impact_speed_m_s == pytest.approx(0.1322, abs=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("drive_off", ["shorted", "open"])
+def test_the_peaks_of_a_held_shot_are_between_its_steps(drive_off):
+    """Each stretch is looked at a thousand times as often as it was stepped."""
+    gun, grip = GunParameters(drive_off=drive_off), HandMechanics(stiffness_N_m=2000.0, damping_N_s_m=2.0)
+    kick_m, felt_N = 0.0, 0.0
+    for one in hand._stretches(gun, grip, 0.4, dense=True):
+        x, v = one.between(np.linspace(one.times[0], one.times[-1], 20_001))[3:5]
+        kick_m, felt_N = max(kick_m, x.max()), max(felt_N, np.abs(2000.0 * x + 2.0 * v).max())
+    held = simulate_held(gun, grip)
+    assert held.peak_kick_m == pytest.approx(kick_m, rel=1e-7)
+    assert held.peak_hand_force_N == pytest.approx(felt_N, rel=1e-7)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction_N", "drive_off", "emf"), VARIANTS)
 def test_a_held_gun_kicks_and_keeps_its_momentum(friction_N, drive_off, emf):
@@ -136,7 +176,9 @@ def test_a_held_gun_kicks_and_keeps_its_momentum(friction_N, drive_off, emf):
 
 
 def test_a_hand_that_physics_has_not_is_refused():
-    with pytest.raises(ValueError, match="mass above 0"):
+    with pytest.raises(ValueError, match=r"^enclosure_mass_kg is 0; it must be finite and above 0$"):
         HandMechanics(enclosure_mass_kg=0.0)
+    with pytest.raises(ValueError, match=r"^damping_N_s_m is nan; it must be finite and at least 0$"):
+        HandMechanics(damping_N_s_m=math.nan)
     with pytest.raises(ValueError, match="until_s is 0"):
         simulate_held(GunParameters(), until_s=0)

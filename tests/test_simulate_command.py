@@ -60,7 +60,7 @@ def test_a_vibration_is_told_traced_and_drawn(recoil, tmp_path):
     [
         (("--hand", "soft"), "`assumed`"),
         (("--hand", "stiffness_N_m=hard"), "'hard' is not a number"),
-        (("--hand", "enclosure_mass_kg=0"), "mass above 0"),
+        (("--hand", "enclosure_mass_kg=0"), "enclosure_mass_kg is 0; it must be finite and above 0"),
         (("--contact-stiffness", "nan"), "--contact-stiffness nan"),
         (("--contact-stiffness", "-1"), "above 0"),
         (("--set", "return_friction_N=-1"), "return_friction_N is -1.0"),

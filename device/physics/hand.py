@@ -9,9 +9,10 @@ where the coil's time constant is below 20 us).
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -22,6 +23,8 @@ from device.parameters import GunParameters
 
 _RTOL, _ATOL = 1e-10, 1e-13
 _MAX_PHASES = 200
+_MAX_WORK = 200_000  # evaluations of the equations: some seconds, where an ordinary shot takes five thousand
+_SET_OUT_S = 1e-7  # the first step of a magnet that sets out: a longer one may hold a whole hop
 _STIFF_S = 2e-5  # of the coil's time constant
 _SLACK = 1e-9  # relative: what friction does not hold by less than this, it holds
 
@@ -37,9 +40,11 @@ class HandMechanics:
     damping_N_s_m: float = 10.0  # assumed
 
     def __post_init__(self) -> None:
-        numbers = (self.enclosure_mass_kg, self.stiffness_N_m, self.damping_N_s_m)
-        if not (all(0 <= number < math.inf for number in numbers) and self.enclosure_mass_kg > 0):
-            raise ValueError(f"{self}; the numbers must be finite and at least 0, and the mass above 0")
+        if not 0 < self.enclosure_mass_kg < math.inf:
+            raise ValueError(f"enclosure_mass_kg is {self.enclosure_mass_kg:g}; it must be finite and above 0")
+        for name, number in (("stiffness_N_m", self.stiffness_N_m), ("damping_N_s_m", self.damping_N_s_m)):
+            if not 0 <= number < math.inf:
+                raise ValueError(f"{name} is {number:g}; it must be finite and at least 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +81,10 @@ class _Phase:
         force_N = self.force(x, i)
         back = (force_N - held_N) / hand.enclosure_mass_kg
         return [v, force_N / gun.magnet_mass_kg + back, current, V, back, held_N]
+
+    def felt_rate(self, rates: Sequence[float]) -> float:
+        """How the force on the hand changes, in N/s, by the rates of the state."""
+        return self.hand.stiffness_N_m * rates[3] + self.hand.damping_N_s_m * rates[4]
 
     def hold(self, x: float) -> float:
         """The coil's hold, 0 outside."""
@@ -143,7 +152,8 @@ def _blow(gun: GunParameters, hand: HandMechanics, since_s: Vector, speed_m_s: f
 class _Stretch:
     """A shot between two events: times and states, and the speed of a landing at its end.
 
-    `between` gives the states at any time of it, if that was asked for.
+    `path`: first the states where kick and force on the hand turn, then those of the times. `between` gives the states
+    at any time of it, if that was asked for.
     """
 
     phase: _Phase
@@ -156,23 +166,45 @@ class _Stretch:
 def _stretches(gun: GunParameters, hand: HandMechanics, until_s: float, *, dense: bool = False) -> Iterator[_Stretch]:
     if not 0 < until_s < math.inf:
         raise ValueError(f"until_s is {until_s}; it must be a finite time above 0")
-    t, y, broke = 0.0, np.zeros(6), 0
+    t, y, broke, rests, work = 0.0, np.zeros(6), 0, False, itertools.count(1)
     for _ in range(_MAX_PHASES):
         phase = _phase(gun, hand, t, y, broke)
+        phase = replace(phase, way=0) if rests else phase
         limit_s = gun.pulse_s if t < gun.pulse_s < until_s else until_s
-        how: dict[str, Any] = {"rtol": _RTOL, "atol": _ATOL, "max_step": 2e-3, "dense_output": dense}
-        found: Any = scipy.integrate.solve_ivp(phase.rates, (t, limit_s), y, _method(gun), events=_events(phase), **how)
-        if found.status < 0:
-            raise RuntimeError(f"the held shot stopped at {found.t[-1]:g} s: {found.message}")
-        t, y = float(found.t[-1]), found.y[:, -1].copy()
+        found = _integrated(phase, (t, limit_s), y, work, dense=dense)
+        began_s, t, y = t, float(found.t[-1]), found.y[:, -1].copy()
         landed = found.status == 1 and phase.way < 0 and len(found.t_events[1]) > 0
         landed_m_s = -float(y[1]) if landed else None
-        yield _Stretch(phase=phase, times=found.t, path=found.y, between=found.sol, landed_m_s=landed_m_s)
+        path = np.concatenate([*(some.T for some in found.y_events[2:] if len(some)), found.y], axis=1)
+        yield _Stretch(phase=phase, times=found.t, path=path, between=found.sol, landed_m_s=landed_m_s)
         if t >= until_s:
             return
         broke = (1 if len(found.t_events[0]) else -1) if found.status == 1 and phase.way == 0 else 0
+        rests = phase.way != 0 and t == began_s  # set out and got nowhere: it rests until the forces let it go anew
         _settle(phase, found, t, y)
-    raise RuntimeError(f"the held shot came to {t:g} s in {_MAX_PHASES} stretches; the magnet hardly moves or rests")
+    raise RuntimeError(
+        f"the held shot came to {t:g} s in {_MAX_PHASES} stretches of motion and rest; ask for another hand or gun"
+    )
+
+
+def _integrated(phase: _Phase, span_s: tuple[float, float], y: Vector, work: Iterator[int], *, dense: bool) -> Any:
+    """A stretch as scipy has it. `RuntimeError`: it did not get to an event or the end, or took too much work."""
+
+    def rates(t: float, state: Vector) -> list[float]:
+        if next(work) > _MAX_WORK:
+            raise RuntimeError(
+                f"the held shot came to {t:g} s in {_MAX_WORK:,} evaluations; the hand is too stiff, or the enclosure "
+                "too light, to be followed"
+            )
+        return phase.rates(t, state)
+
+    how: dict[str, Any] = {"rtol": _RTOL, "atol": _ATOL, "max_step": 2e-3, "dense_output": dense}
+    if phase.way != 0 and y[1] == 0.0:
+        how["first_step"] = min(_SET_OUT_S, span_s[1] - span_s[0])
+    found: Any = scipy.integrate.solve_ivp(rates, span_s, y, _method(phase.gun), events=_events(phase), **how)
+    if found.status < 0:
+        raise RuntimeError(f"the held shot stopped at {found.t[-1]:g} s: {found.message}")
+    return found
 
 
 def _landing(gun: GunParameters, stretches: list[_Stretch]) -> tuple[float, float] | None:
@@ -201,16 +233,22 @@ def _phase(gun: GunParameters, hand: HandMechanics, t: float, y: Vector, broke: 
 
 
 def _events(phase: _Phase) -> list[Any]:
-    """Break-away at rest (outwards, homewards); in motion turn, and stop or coil edge."""
+    """Break-away at rest (outwards, homewards) or, in motion, turn and stop; then extremes of kick and felt force."""
     out_N, back_N = (
         friction_N * (1 + 2 * _SLACK) + 1e-12 for friction_N in (phase.gun.friction_N, phase.gun.homeward_friction_N)
     )
+    extremes = [lambda _t, y: y[4], lambda t, y: phase.felt_rate(phase.rates(t, y))]
     if phase.way == 0:
         return [
             _ends(lambda _t, y: phase.pull(y) - out_N, 1),
             _ends(lambda _t, y: phase.pull(y) + back_N if y[0] > 0 else 1.0, -1),
+            *extremes,
         ]
-    return [_ends(lambda _t, y: phase.way * y[1], -1), _ends(lambda _t, y: y[0] if phase.way < 0 else 1.0, -1)]
+    return [
+        _ends(lambda _t, y: phase.way * y[1], -1),
+        _ends(lambda _t, y: y[0] if phase.way < 0 else 1.0, -1),
+        *extremes,
+    ]
 
 
 def _ends(function: Callable[[float, Vector], float], direction: int) -> Any:
