@@ -1,4 +1,4 @@
-"""The shipped experiment 1 as text, with somebody who feels the gun and instructions for its sets."""
+"""The shipped experiment 1 with somebody who feels the gun, and instructions for its sets."""
 
 from __future__ import annotations
 
@@ -8,40 +8,33 @@ from pathlib import Path
 
 from experiments.load import shipped_folder
 
-TEXTS = {"speed": "Answer as fast as you can.", "neutral": "Answer fast and well.", "accuracy": "Be sure."}
-BALANCE = 'balance = "session"'
 
-
-def shipped_text(name: str = "direction") -> str:
-    return (shipped_folder() / f"{name}.toml").read_text(encoding="utf-8")
-
-
-def felt_text(names: tuple[str, ...] = (), **values: object) -> str:
-    """The config for "felt" with these instructions; `values` replace those of keys, wherever they stand first."""
-    tables = "".join(f'\n[instructions.{name}]\ntext = "{TEXTS[name]}"\n' for name in names)
-    told = ", ".join(f'"{name}"' for name in names)
-    text = changed(shipped_text(), (BALANCE, f"{BALANCE}\ninstructions = [{told}]"))
-    for key, value in ({"observer": '"felt"'} | values).items():
-        old = next(line for line in text.splitlines() if line.startswith(f"{key} ="))
-        text = text.replace(old, f"{key} = {value}", 1)
-    return text + tables
-
-
-def changed(text: str, *edits: tuple[str, str]) -> str:
-    for old, new in edits:
-        assert old in text, f"no {old!r} any more"
-        text = text.replace(old, new, 1)
-    return text
-
-
-def written(folder: Path, text: str, name: str = "direction") -> Path:
-    """The config in a folder with the shipped gun."""
-    shutil.copy(shipped_folder() / "gun.toml", folder)
-    path = folder / f"{name}.toml"
+def felt_config(
+    folder: Path,
+    instructions: tuple[str, ...] = (),
+    spreads: Mapping[str, float] | None = None,
+    sensitivity: float | None = None,
+) -> Path:
+    """The shipped experiment 1 with people who feel the gun, differ so much, and are told so before their sets."""
+    for name in ("gun.toml", "direction.toml", "synthetic/direction-felt.toml"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(shipped_folder() / name, folder / name)
+    path, people = folder / "direction.toml", folder / "synthetic" / "direction-felt.toml"
+    text = edited(path.read_text(encoding="utf-8"), "synthetic/direction.toml", "synthetic/direction-felt.toml")
+    if instructions:
+        texts = "".join(f'texts.{name} = "Answer with {name}."\n' for name in instructions)
+        factor = f"[factors.instruction]\nlevels = {[*instructions]}\n{texts}\n[order]\nset = ['instruction']"
+        text = edited(text, "[order]", factor)
     path.write_text(text, encoding="utf-8")
+    law = people.read_text(encoding="utf-8")
+    for name, sd in (spreads or {}).items():
+        law = edited(law, f"{name} = 0.0", f"{name} = {sd}")
+    if sensitivity is not None:
+        law = edited(law, "sensitivity = 0.213", f"sensitivity = {sensitivity}")
+    people.write_text(law, encoding="utf-8")
     return path
 
 
-def felt_config(folder: Path, instructions: tuple[str, ...] = (), spreads: Mapping[str, float] | None = None) -> Path:
-    """The shipped config with people who feel the gun and differ so much, told so."""
-    return written(folder, felt_text(instructions, **(spreads or {})))
+def edited(text: str, old: str, new: str) -> str:
+    assert old in text
+    return text.replace(old, new, 1)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,40 +17,17 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.planning import plan_of
 from experiments.design.streams import generator
-from experiments.load import load_setup, shipped_folder
+from experiments.load import load_setup
 from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.decision import forward_rates
 from experiments.synthetic.diffusion import People
 from experiments.synthetic.laws import DiffusionLaw
 from tests.conftest import Recoil
+from tests.felt_configs import felt_config
 from tests.power_chain import homogeneity_p
 
 METHODS = ("vibration", "asymmetric-1", "asymmetric-2")
 SPREADS = {"drift_factor_sd": 0.3, "log_boundary_sd": 0.2, "logit_start_sd": 0.4}
-
-
-def felt_config(folder: Path, instructions: tuple[str, ...] = (), spreads: Mapping[str, float] | None = None) -> Path:
-    """The shipped experiment 1 with people who feel the gun, differ so much, and are told so before their sets."""
-    for name in ("gun.toml", "direction.toml", "synthetic/direction-felt.toml"):
-        (folder / name).parent.mkdir(exist_ok=True)
-        shutil.copy(shipped_folder() / name, folder / name)
-    path, people = folder / "direction.toml", folder / "synthetic" / "direction-felt.toml"
-    text = edited(path.read_text(encoding="utf-8"), "synthetic/direction.toml", "synthetic/direction-felt.toml")
-    if instructions:
-        texts = "".join(f'texts.{name} = "Answer with {name}."\n' for name in instructions)
-        factor = f"[factors.instruction]\nlevels = {[*instructions]}\n{texts}\n[order]\nset = ['instruction']"
-        text = edited(text, "[order]", factor)
-    path.write_text(text, encoding="utf-8")
-    law = people.read_text(encoding="utf-8")
-    for name, sd in (spreads or {}).items():
-        law = edited(law, f"{name} = 0.0", f"{name} = {sd}")
-    people.write_text(law, encoding="utf-8")
-    return path
-
-
-def edited(text: str, old: str, new: str) -> str:
-    assert old in text
-    return text.replace(old, new, 1)
 
 
 def felt_of(setup: Setup[DesignConfig], effect: float = 1.0) -> Felt:

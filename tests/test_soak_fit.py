@@ -127,7 +127,7 @@ def one_study(folder: str, config: str, seed: int) -> dict[str, tuple[bool, bool
 
 def test_null_participants_who_feel_nothing_through_real_logs(tmp_path: Path, soak: Soak) -> None:
     """40 studies of 14 people: 560 runs with journal and table, read and summarised as `recoil analyze` does."""
-    config = felt_config(tmp_path, spreads=SPREADS | {"sensitivity": 0.0})
+    config = felt_config(tmp_path, spreads=SPREADS, sensitivity=0.0)
     studies: dict[int, dict[str, tuple[bool, bool]]] = {}
     with on_processes(cores()) as run:
         run(partial(one_study, str(tmp_path), str(config)), range(1, LOGGED + 1), studies.__setitem__)
