@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from device.plugin.door import own_program
+from device.own_process import own_program
 from device.plugin.guard import PluginError
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorLink

@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 import inspect
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import cast
 
 from device.methods import Method
+from device.own_process import own_program
 from device.plugin.guard import (
     DISARM_S,
     GuardedGun,
@@ -208,16 +208,6 @@ def try_import(name: str, seconds: float = IMPORT_S) -> None:
         ended = f"was killed by signal {-done.returncode}" if done.returncode < 0 else "failed"
         ended = ended if done.returncode else "ended the process"
         raise PluginError(f"gun plug-in {name}: its import {ended}: {said.rpartition(chr(10))[2] or 'it said nothing'}")
-
-
-OWN_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
-"""How a program is started on Windows that Ctrl+C is not for; elsewhere `start_new_session` keeps it away."""
-
-
-def own_program(module: str, word: str) -> tuple[list[str], dict[str, str]]:
-    """The command and the environment of `python -m MODULE WORD`, which finds the packages that this process finds."""
-    paths = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
-    return [sys.executable, "-P", "-m", module, word], os.environ | {"PYTHONPATH": paths}
 
 
 def entry_of(name: str, kind: PluginKind = GUN_PLUGINS) -> EntryPoint:

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from device.machine_clock import machine_s
 from device.methods import Method
-from device.plugin.door import OWN_GROUP, own_program
+from device.own_process import OWN_GROUP, own_program
 from device.sensor.process import UNHEARD_S, SensorReady, ShotAsked, ShotReply
 from device.sensor.streams import SensorError
 

@@ -15,7 +15,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import IO
 
-from device.plugin.door import OWN_GROUP
+from device.own_process import OWN_GROUP
 from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
 
 READY_S, _SOON_S = 20.0, 5.0
