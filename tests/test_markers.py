@@ -209,7 +209,7 @@ def test_what_an_odd_library_does_in_a_run_is_said_once(  # noqa: PLR0917
     parts["push"] = f"open({str(pushed)!r}, 'w').close(); {parts['push']}"
     (tmp_path / "fake").mkdir()
     (tmp_path / "fake" / "pylsl.py").write_text(LIBRARY.format(**parts))
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
+    monkeypatch.syspath_prepend(tmp_path / "fake")
     told = list[str]()
     with markers_beside(journal.parents[1], told.append):
         journal.write_bytes(forged(now(entries_of(whole))[:3]))

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from device.own_process import own_program
+from device.own_process import own_environment, own_program
 from device.plugin.guard import PluginError
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorLink
@@ -337,8 +337,8 @@ def test_a_sensor_that_hangs_while_it_opens_ends_with_who_started_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     install_sensor(monkeypatch, tmp_path, OPENS, name="opens", module="opening_sensor")
-    command, environment = own_program("device.sensor", f"opens:{tmp_path / 'there'}")
-    with subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+    command = own_program("device.sensor", f"opens:{tmp_path / 'there'}")
+    with subprocess.Popen(command, env=own_environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         wait_for((tmp_path / "there").exists)
         assert child.stdin is not None
         child.stdin.close()

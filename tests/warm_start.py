@@ -194,6 +194,8 @@ def _be(request: list[bytes], streams: list[int]) -> NoReturn:
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(os.fsdecode(pair).split("=", 1) for pair in rest[int(count) :])
+    own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    sys.path[:0] = [path for path in own if path and path not in sys.path]
     if figure_files.ASKED in os.environ:
         figure_files.draw()
     sys.stdin, sys.stdout, sys.stderr = (_text(number, mode) for number, mode in enumerate("rww"))

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import cast
 
 from device.methods import Method
-from device.own_process import own_program
+from device.own_process import own_environment, own_program
 from device.plugin.guard import (
     DISARM_S,
     GuardedGun,
@@ -185,15 +185,14 @@ def _put_away(gun: object, why: PluginError) -> None:
 
 def try_import(name: str, seconds: float = IMPORT_S) -> None:
     """Import a plug-in in a process of its own, which may hang or crash. `PluginError` says what it did."""
-    command, environment = own_program("device.plugin", name)
     with tempfile.TemporaryFile() as errors:
         try:
             done = subprocess.run(
-                command,
+                own_program("device.plugin", name),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                env=environment,
+                env=own_environment(),
                 timeout=seconds,
                 check=False,
             )

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from device.machine_clock import machine_s
 from device.methods import Method
-from device.own_process import OWN_GROUP, own_program
+from device.own_process import OWN_GROUP, how_ended, own_environment, own_program
 from device.sensor.process import UNHEARD_S, SensorReady, ShotAsked, ShotReply
 from device.sensor.streams import SensorError
 
@@ -81,13 +81,12 @@ class SensorLink:
 
     def __init__(self, address: str, start_s: float = START_S) -> None:
         self.address, self.silent, self.dropped, self.ended = address, False, 0, ""
-        command, environment = own_program("device.sensor", address)
         self._process = subprocess.Popen(
-            command,
+            own_program("device.sensor", address),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env=environment,
+            env=own_environment(),
             start_new_session=True,  # Ctrl-C is for the run, which closes it
             creationflags=OWN_GROUP,
         )
@@ -175,8 +174,6 @@ class SensorLink:
                 if said.silent is None and said.dropped is None:
                     self._said.put(said)
         if not ended:
-            code = self._process.wait()
-            how = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-            ended = f"its process {how}"
+            ended = f"its process {how_ended(self._process.wait())}"
             self._said.put(SensorSaid(ended=ended))
         self.ended = f"{self.address}: {ended}"

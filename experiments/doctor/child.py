@@ -5,19 +5,15 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import IO
 
 from pydantic import TypeAdapter
 
+from device.own_process import how_ended, own_environment, own_program
 from experiments.doctor.figures import ProgramFigures
-
-_ROOT = Path(__file__).parents[2]
-"""Where `experiments` lies: started there, the child runs the same code, whatever the caller's folder holds."""
 
 _KILLED_S = 5.0
 
@@ -41,14 +37,14 @@ _REPLY = TypeAdapter(ProgramReply)
 
 def ask(program: str, seconds: float) -> ProgramReply:
     """Run one of the programs beside this module for so long at most."""
-    return run_child([sys.executable, "-m", "experiments.doctor.programs", program], seconds)
+    return run_child(own_program("experiments.doctor.programs", program), seconds)
 
 
 def run_child(command: list[str], seconds: float) -> ProgramReply:
     """Run a command that answers with one JSON object; killed after its time, or when this process is interrupted."""
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as errors:
         child = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=said, stderr=errors, cwd=_ROOT, env=os.environ | _TALKATIVE
+            command, stdin=subprocess.DEVNULL, stdout=said, stderr=errors, env=own_environment() | _TALKATIVE
         )
         try:
             code = child.wait(seconds)
@@ -64,8 +60,7 @@ def run_child(command: list[str], seconds: float) -> ProgramReply:
 def _answer(code: int, said: str, errors: str) -> ProgramReply:
     if code == 0 and said:
         return _REPLY.validate_json(said)
-    ending = f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-    return ProgramReply(error=f"{ending}: {cause(errors)}")
+    return ProgramReply(error=f"{how_ended(code)}: {cause(errors)}")
 
 
 def cause(errors: str) -> str:

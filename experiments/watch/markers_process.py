@@ -15,7 +15,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import IO
 
-from device.own_process import OWN_GROUP
+from device.own_process import OWN_GROUP, end_program, own_environment, own_program
 from experiments.watch.lsl import MarkerStreams, NoStreams, send_markers
 
 READY_S, _SOON_S = 20.0, 5.0
@@ -23,7 +23,6 @@ READY_S, _SOON_S = 20.0, 5.0
 _END_S, _STOPPED_S = 5.0, 1.0
 """How long the streams have for what is still to be sent, and again to end when they are told to; and where the run was
 broken off."""
-_ROOT = Path(__file__).parents[2]
 _Tell = Callable[[str], None]
 _READY, _PROBLEM = "ready", "markers: "
 
@@ -31,15 +30,14 @@ _READY, _PROBLEM = "ready", "markers: "
 @contextmanager
 def markers_beside(results: Path, say: _Tell) -> Iterator[None]:
     """Have the runs of a results folder sent meanwhile. Whatever is in the way is said once, and nothing else."""
-    command = [sys.executable, "-m", __name__, str(results.absolute())]
     try:
         child = subprocess.Popen(
-            command,
+            own_program(__name__, str(results.absolute())),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             encoding="utf-8",
-            cwd=_ROOT,
+            env=own_environment(),
             start_new_session=True,  # Ctrl+C is for the run
             creationflags=OWN_GROUP,
         )
@@ -98,7 +96,7 @@ def _end(child: subprocess.Popen[str], lines: queue.SimpleQueue[str], tell: _Tel
     with suppress(OSError):
         assert child.stdin is not None  # noqa: S101 - a pipe
         child.stdin.close()
-    hung = not _ended(child, left_s)
+    hung = not end_program(child, left_s)
     with suppress(queue.Empty):
         while said := lines.get(timeout=left_s):
             if said != _READY:
@@ -107,16 +105,6 @@ def _end(child: subprocess.Popen[str], lines: queue.SimpleQueue[str], tell: _Tel
         tell("markers: their process hung and was ended; some may not have been sent, and the journal is whole")
     elif child.returncode not in (0, 2):
         tell(f"markers: their process broke off (exit code {child.returncode}); its journal is whole")
-
-
-def _ended(child: subprocess.Popen[str], left_s: float) -> bool:
-    """Whether a child ends by itself; one that does not is ended."""
-    for insist in (child.poll, child.terminate, child.kill):
-        insist()
-        with suppress(subprocess.TimeoutExpired):
-            child.wait(left_s)
-            return insist == child.poll
-    return False
 
 
 def _until_left(over: threading.Event) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import queue
-import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -17,6 +16,7 @@ from typing import Self, TypeVar
 
 from pydantic import ValidationError
 
+from device.own_process import own_program
 from device.words import RecoilError
 from experiments.clock import RealClock
 from experiments.screens.participant import messages
@@ -108,7 +108,7 @@ class ParticipantLink:
     @classmethod
     def start(cls, look: messages.Look | None = None, *, command: Sequence[str] | None = None) -> Self:
         """Start the program and return at once; its window takes seconds to open. `command` is another program."""
-        own = (sys.executable, "-m", "experiments.screens.participant", *messages.arguments(look or messages.Look()))
+        own = own_program("experiments.screens.participant", *messages.arguments(look or messages.Look()))
         return cls(command or own)
 
     @property

@@ -9,11 +9,9 @@ import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import IO
 
-_ROOT = Path(__file__).parents[3]
-"""Where `experiments` lies: started there, the child runs the same code, whatever the console's folder holds."""
+from device.own_process import end_program, how_ended, own_environment
 
 _LAST_BYTES = 4_000
 
@@ -29,7 +27,11 @@ class ParticipantProcess:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed in end()
         try:
             self._child = subprocess.Popen(
-                list(command), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, cwd=_ROOT
+                list(command),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                env=own_environment(),
             )
         except OSError:
             self._errors.close()
@@ -61,11 +63,7 @@ class ParticipantProcess:
     def end(self) -> None:
         """Close its input, then ask it to end, then kill it."""
         self._out.put(None)
-        for insist in (self._child.poll, self._child.terminate, self._child.kill):
-            insist()
-            with suppress(subprocess.TimeoutExpired):
-                self._child.wait(END_S)
-                break
+        end_program(self._child, END_S)
         for thread in self._threads:
             thread.join(END_S)
         self._errors.close()
@@ -74,7 +72,9 @@ class ParticipantProcess:
         """How the child ended, with its last words."""
         with suppress(subprocess.TimeoutExpired):
             self._child.wait(END_S)
-        return f"the participant's screen {_ending(self._child.returncode)}{self._last_words()}"
+        code = self._child.returncode
+        fate = "closed its output" if code is None else how_ended(code)
+        return f"the participant's screen {fate}{self._last_words()}"
 
     def _last_words(self) -> str:
         """The end of what the child wrote as errors; its file position is the child's too, so it stays where it is."""
@@ -106,9 +106,3 @@ def _read_at(descriptor: int, start: int) -> bytes:
         return os.read(descriptor, _LAST_BYTES)
     finally:
         os.lseek(descriptor, position, os.SEEK_SET)
-
-
-def _ending(code: int | None) -> str:
-    if code is None:
-        return "closed its output"
-    return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
