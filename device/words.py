@@ -97,7 +97,7 @@ def first_few(names: Sequence[object], most: int) -> str:
     >>> first_few(["P1", "P2", "P3"], 2), first_few(["P1", "P2"], 2)
     ('P1, P2 and 1 more', 'P1, P2')
     """
-    more = f" and {len(names) - most} more" if len(names) > most else ""
+    more = f" and {len(names) - most:,} more" if len(names) > most else ""
     return ", ".join(map(str, names[:most])) + more
 
 

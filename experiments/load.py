@@ -181,7 +181,7 @@ def check_limits(setup: Setup[DesignConfig]) -> list[MethodLimits]:
         for cell, one in zip(cells, found, strict=True):
             every_s = dict(cell.levels).get(TRAIN_INTERVAL, trial.repeat_every_s)
             if isinstance(every_s, float):
-                _check_train(setup.source, one, every_s, trial.max_shots, "trial.repeat_every_s")
+                _check_train(setup.source, one, every_s, trial.max_shots)
     return found
 
 
@@ -214,7 +214,7 @@ def _never_moves(gun: GunParameters) -> str:
     )
 
 
-def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int, key: str) -> None:
+def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int) -> None:
     history = DriveHistory()
     try:
         for start_s in (shot * every_s for shot in range(min(shots, _ENOUGH_SHOTS))):
@@ -223,8 +223,9 @@ def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int,
         raise ConfigError(
             at_key(
                 source,
-                f"{key} = {every_s:g}: {method.method} needs {method.settle_s:.4g} s until its magnet is home, and no "
-                f"more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed ({error}); repeat more slowly",
+                f"trial.repeat_every_s = {every_s:g}: {method.method} needs {method.settle_s:.4g} s until its magnet "
+                f"is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed ({error}); repeat more "
+                "slowly",
             )
         ) from error
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, get_args
 
 from device.methods import Rendering
-from device.words import GunStatus, Pulse, Shot, ShotReport, ShotTiming, is_finite, is_whole_number
+from device.words import GunState, GunStatus, Pulse, Shot, ShotReport, ShotTiming, is_finite, is_whole_number
 
 HANDED_OVER_S = 0.05
 """So long before its time a shot is handed to the plug-in; until then the guard alone waits. Assumed: a train's shots
@@ -123,16 +123,13 @@ def is_line(value: object) -> bool:
     return isinstance(value, str) and 0 < len(value) <= _LONGEST_LINE and value.isprintable()
 
 
-_STATES = ("disarmed", "armed", "resetting", "fault")
-
-
 def broken_status(said: object, now_s: float) -> str:
     """The first rule that a plug-in's status breaks, with its value; empty if there is none."""
     broken = ""
     if not isinstance(said, GunStatus):
         broken = f"{said!r}; it must be a GunStatus"
-    elif said.state not in _STATES:
-        broken = f"state {said.state!r}; it must be one of {', '.join(_STATES)}"
+    elif said.state not in get_args(GunState):
+        broken = f"state {said.state!r}; it must be one of {', '.join(get_args(GunState))}"
     elif not (is_whole_number(said.shots) and 0 <= said.shots < MOST_SHOTS):
         broken = f"shots {said.shots!s:.20}; it must be a whole number of at least 0"
     elif not (said.fault is None or (is_line(said.fault) and said.state == "fault")):

@@ -46,7 +46,7 @@ def plan_of(design: DesignConfig, participant_id: str, seed: int, *, row: int | 
 
     `ConfigError`: the row or group does not exist, or the design asks for a balance that there is none of.
     """
-    given = _chosen("group", groups(design), group)
+    given = _of_group(design, group)
     if row is not None and row not in range(square_size(design)):
         rows = square_size(design)
         rule = (
@@ -87,7 +87,7 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
     The levels of the other factors are drawn. A practice is of the gun: it has no instruction. Each round that there
     may be is a set.
     """
-    practice, given = design.practice, _chosen("group", groups(design), group)
+    practice, given = design.practice, _of_group(design, group)
     streams = Streams(seed, (design.design, participant_id, "practice"))
     alike: dict[Condition, list[Content]] = {}
     for content in _everything(design, given, streams):
@@ -99,7 +99,7 @@ def practice_of(design: DesignConfig, participant_id: str, seed: int, *, group: 
         for content in _round(list(alike.values()), practice.repetitions, streams, number)
     ]
     trials = [
-        _trial(design, (1, number, place), _without(INSTRUCTION_FACTOR, content.levels), content)
+        _trial(design, (1, number, place), _without_instruction(content.levels), content)
         for place, (number, content) in enumerate(drawn, start=1)
     ]
     return Plan(
@@ -125,8 +125,8 @@ def _round(cells: Sequence[Sequence[Content]], count: int, streams: Streams, num
     return streams.of("practice", *own).shuffled(drawn)
 
 
-def _without(name: str, levels: Condition) -> Condition:
-    return tuple(pair for pair in levels if pair[0] != name)
+def _without_instruction(levels: Condition) -> Condition:
+    return tuple(pair for pair in levels if pair[0] != INSTRUCTION_FACTOR)
 
 
 def _some(contents: Sequence[Content], count: int, stream: Stream) -> list[Content]:
@@ -159,10 +159,12 @@ def _trial(design: DesignConfig, place: tuple[int, int, int], levels: Condition,
     )
 
 
-def _chosen(what: str, among: Sequence[Condition], place: int) -> Condition:
-    if place not in range(len(among)):
-        raise ConfigError(f"{what} = {place!r}: there are {len(among)}, counted from 0")
-    return among[place]
+def _of_group(design: DesignConfig, group: int) -> Condition:
+    """The levels of a group. `ConfigError`: there is none of that number."""
+    among = groups(design)
+    if group not in range(len(among)):
+        raise ConfigError(f"group = {group!r}: there are {len(among)}, counted from 0")
+    return among[group]
 
 
 def _ordered(order: BlockOrder, items: Sequence[Condition], row: int | None, stream: Stream) -> list[Condition]:

@@ -21,6 +21,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BeforeValidator
 
 from analysis.report.serial import beside, written
+from device.words import first_few
 
 Relation = Literal["=", "<", "<=", ">", ">="]
 _RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}
@@ -385,9 +386,7 @@ LISTED_AT_MOST = 12
 
 def listed(values: Sequence[object]) -> str:
     """Values for a report: the first of them, and how many more there are."""
-    shown = values[:LISTED_AT_MOST]
-    more = len(values) - len(shown)
-    return ", ".join(map(str, shown)) + (f" and {more} more" if more > 0 else "")
+    return first_few(values, LISTED_AT_MOST)
 
 
 def listed_by_rounding(values: Callable[[Rounding], Sequence[int]]) -> str:

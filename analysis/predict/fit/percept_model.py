@@ -119,9 +119,13 @@ def _slopes(likelihood: _Likelihood, parameters: PerceptParameters) -> Floats:
     return np.column_stack(columns)
 
 
-def _slope(rates: Callable[[float], Floats], step: float = 1e-4) -> Floats:
+_STEP = 1e-4
+"""Of the logarithm of a factor, to either side."""
+
+
+def _slope(rates: Callable[[float], Floats]) -> Floats:
     """The derivative by the logarithm of a factor."""
-    return (rates(math.exp(step)) - rates(math.exp(-step))) / (2.0 * step)
+    return (rates(math.exp(_STEP)) - rates(math.exp(-_STEP))) / (2.0 * _STEP)
 
 
 def _scaled(likelihood: _Likelihood, parameters: PerceptParameters, name: str, factor: float) -> Floats:

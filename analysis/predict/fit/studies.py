@@ -86,7 +86,7 @@ def read_request(request: PerceptRequest) -> PerceptTask:
         rates=rates,
         trials=trials,
         methods=_methods(find(request.gun), gun, rates),
-        people=scaled_spread(ASSUMED_SPREAD, request.spread),
+        people=assumed_spread(request.spread),
         published=published,
         labels=gun.labels,
     )
@@ -119,9 +119,9 @@ def published_rates(published: PublishedDirection) -> tuple[dict[str, float], in
     return rates, published.n * published.protocol.forward_trials_per_session
 
 
-def scaled_spread(people: People, factor: float) -> People:
-    """People who differ so many times as much."""
-    return People(**{name: factor * sd for name, sd in asdict(people).items()})
+def assumed_spread(factor: float) -> People:
+    """People who differ so many times as much as is assumed."""
+    return People(**{name: factor * sd for name, sd in asdict(ASSUMED_SPREAD).items()})
 
 
 def _published(request: PerceptRequest) -> PublishedDirection:
@@ -150,7 +150,7 @@ HISTOGRAM_BINS = 40
 LARGEST_VARIANCE = 2.0
 """Of a fitted number's logarithm: beyond, the normal approximation describes nothing that could be drawn (assumed)."""
 MAIN = "assumed spread"
-PEOPLE_KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": scaled_spread(ASSUMED_SPREAD, 2.0)}
+PEOPLE_KINDS = {"people alike": People(), MAIN: ASSUMED_SPREAD, "twice the spread": assumed_spread(2.0)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -91,7 +91,7 @@ def _draw_curves(axes: Axes, panel: Panel, target: float) -> None:
         axes.set_xticks(sizes)
     else:
         axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
-    bounded(axes, 0.0, 100.0)
+    bounded(axes, 100.0)
     axes.set_title(panel.title, loc="left")
 
 

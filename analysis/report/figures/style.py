@@ -328,9 +328,9 @@ def light_grid(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
-def bounded(axes: Axes, low: float, high: float) -> None:
-    """The axis ends with the scale: what stands above it (brackets) has no values."""
-    axes.spines["left"].set_bounds(low, high)
+def bounded(axes: Axes, high: float) -> None:
+    """The axis goes from 0 to the end of the scale: what stands above it (brackets) has no values."""
+    axes.spines["left"].set_bounds(0.0, high)
 
 
 def reference_line(axes: Axes, height: float, text: str, colour: str = GREY) -> None:

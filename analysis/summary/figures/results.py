@@ -162,7 +162,7 @@ def _draw_panel(axes: Axes, panel: _Panel, found: WithinStatistics, title: str) 
     highest = _draw_brackets(axes, pairs, methods, ceiling, 0.075 * panel.top) if pairs else ceiling
     axes.set_ylim(0.0, max(highest, panel.top) + 0.04 * panel.top)
     axes.set_yticks(np.linspace(0.0, panel.top, 6))
-    bounded(axes, 0.0, panel.top)
+    bounded(axes, panel.top)
     name_ticks(axes, methods)
     axes.set_xlabel(found.people, fontsize=8.0, labelpad=8.0)
     axes.set_ylabel(panel.label)
@@ -269,7 +269,7 @@ def _draw_rates(axes: Axes, found: DirectionStatistics, title: str) -> None:
     low, high = axes.dataLim.intervaly  # of an SD that reaches beyond the scale, too
     axes.set_ylim(min(-4.0, low - 2.0), max(106.0, high + 2.0))
     axes.set_yticks(range(0, 101, 20))
-    bounded(axes, 0.0, 100.0)
+    bounded(axes, 100.0)
 
 
 def _draw_pair(axes: Axes, found: DirectionStatistics, method: str, i: int) -> None:

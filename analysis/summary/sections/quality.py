@@ -13,7 +13,7 @@ from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.designs import lacking_conditions
 from analysis.summary.summary import UNDEFINED
 from analysis.times.own_trials import ResponseTimes
-from device.words import how_many
+from device.words import first_few, how_many
 
 
 def quality_section(report: ReportData) -> Iterator[Section]:
@@ -118,8 +118,6 @@ def _ends_rows(name: str, found: WithinStatistics) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _some(codes: Iterable[str], shown: int = 10) -> str:
+def _some(codes: Iterable[str]) -> str:
     """The first few codes, and how many more there are."""
-    people = list(codes)
-    more = f" and {len(people) - shown:,} more" if len(people) > shown else ""
-    return ", ".join(people[:shown]) + more if people else "none"
+    return first_few(list(codes), 10) or "none"
