@@ -6,21 +6,21 @@ import csv
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from device import LimitError
-from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory, Load
-from device.methods import drive_of, rendering_of
+from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory
+from device.methods import rendering_of
 from device.parameters import GunParameters
-from device.words import Drive, escaped
+from device.words import escaped
 from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, why_unread
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import TRAIN_INTERVAL
 from experiments.design.planned import planned_run, plans_of_groups
-from experiments.design.stimuli import limits, shown_cell, unchanged_methods
+from experiments.design.stimuli import ConditionLimits, limits, shown_cell, unchanged_methods
 from experiments.record import storage
 from experiments.record.design_columns import columns
 from experiments.record.tables import MAY_LACK, TABLES, unguard
@@ -158,45 +158,25 @@ def _answer_rows(table: Path, lines: Any, columns: tuple[str, ...]) -> Iterator[
         yield dict(zip(columns, map(unguard, row), strict=True))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MethodLimits:
-    """How a method is driven, what a shot asks of the coil, and how soon the next may follow."""
-
-    method: str
-    drive: Drive
-    load: Load
-    settle_s: float
-
-
-def check_limits(setup: Setup[DesignConfig]) -> list[MethodLimits]:
+def check_limits(setup: Setup[DesignConfig]) -> None:
     """Each cell of a design within the limits, its trains as well. `ConfigError` with cell, value and limit."""
-    with _named(setup.source):
-        cells = limits(setup.config, setup.gun)
-    found = [
-        MethodLimits(method=shown_cell(one.levels), drive=one.drive, load=one.load, settle_s=one.settle_s)
-        for one in cells
-    ]
     trial = setup.config.trial
-    if trial.kind == "train":
-        for cell, one in zip(cells, found, strict=True):
+    with _named(setup.source):
+        for cell in limits(setup.config, setup.gun):
             every_s = dict(cell.levels).get(TRAIN_INTERVAL, trial.repeat_every_s)
-            if isinstance(every_s, float):
-                _check_train(setup.source, one, every_s, trial.max_shots)
-    return found
+            if trial.kind == "train" and isinstance(every_s, float):
+                _check_train(cell, every_s, trial.max_shots)
 
 
-def check_methods(gun: GunConfig, methods: tuple[str, ...], source: Path) -> list[MethodLimits]:
+def check_methods(gun: GunConfig, methods: tuple[str, ...], source: Path) -> None:
     """Methods of a gun that can be run: within the limits, and moving. `ConfigError` names file, method and rule."""
-    found = []
     for name, method in gun.renderings(methods).items():
         try:
-            drive, rendering = drive_of(method), rendering_of(method)
+            rendering = rendering_of(method)
         except LimitError as error:
             raise ConfigError(at_key(source, f"methods.{name}: {error}")) from error
         if isinstance(method, GunParameters) and rendering.motion == "no-break-away":
             raise ConfigError(at_key(source, f"methods.{name}: {_never_moves(method)}"))
-        found.append(MethodLimits(method=name, drive=drive, load=rendering.load, settle_s=rendering.settle_s))
-    return found
 
 
 def _never_moves(gun: GunParameters) -> str:
@@ -214,19 +194,16 @@ def _never_moves(gun: GunParameters) -> str:
     )
 
 
-def _check_train(source: Path, method: MethodLimits, every_s: float, shots: int) -> None:
+def _check_train(cell: ConditionLimits, every_s: float, shots: int) -> None:
     history = DriveHistory()
     try:
         for start_s in (shot * every_s for shot in range(min(shots, _ENOUGH_SHOTS))):
-            history = history.record(method.load, start_s, start_s + method.settle_s)
+            history = history.record(cell.load, start_s, start_s + cell.settle_s)
     except LimitError as error:
         raise ConfigError(
-            at_key(
-                source,
-                f"trial.repeat_every_s = {every_s:g}: {method.method} needs {method.settle_s:.4g} s until its magnet "
-                f"is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed ({error}); repeat more "
-                "slowly",
-            )
+            f"trial.repeat_every_s = {every_s:g}: {shown_cell(cell.levels)} needs {cell.settle_s:.4g} s until its "
+            f"magnet is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed ({error}); repeat "
+            "more slowly"
         ) from error
 
 
