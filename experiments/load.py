@@ -1,26 +1,19 @@
-"""Configs from disk: found, checked with what belongs to them, and held against the limits that no config can lift."""
+"""Configs from disk: found, and checked with what belongs to them."""
 
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from device import LimitError
-from device.limits import MAX_SHOTS_PER_MINUTE, DriveHistory
-from device.methods import rendering_of
-from device.parameters import GunParameters
 from device.words import escaped
-from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, why_unread
+from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, said_of, why_unread
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
-from experiments.design.language import TRAIN_INTERVAL
+from experiments.design.limits import check_methods, limits, unchanged_methods
 from experiments.design.planned import planned_run, plans_of_groups
-from experiments.design.stimuli import ConditionLimits, limits, shown_cell, unchanged_methods
 from experiments.record import storage
 from experiments.record.design_columns import columns
 from experiments.record.tables import MAY_LACK, TABLES, unguard
@@ -68,7 +61,7 @@ def load_setup(name: str | Path) -> Setup[DesignConfig]:
         )
     design = load(DesignConfig, path)
     setup = Setup(config=design, gun=load_gun(path.parent / design.gun), source=path)
-    with _named(path):
+    with said_of(path):
         _check_known_columns(design)
         plans = plans_of_groups(design)
         for plan in plans:
@@ -76,7 +69,7 @@ def load_setup(name: str | Path) -> Setup[DesignConfig]:
     by_gun = () if design.below_break_away else unchanged_methods(design)
     if set(by_gun) <= set(setup.gun.methods):
         check_methods(setup.gun, by_gun, path.parent / design.gun)
-    with _named(path):
+    with said_of(path):
         limits(design, setup.gun)
     if not design.synthetic:
         return setup
@@ -84,7 +77,7 @@ def load_setup(name: str | Path) -> Setup[DesignConfig]:
     if not people.is_file():
         raise ConfigError(f"{people}: {_why_none(people)}; the config's key `synthetic` names it")
     laws = load(SyntheticAnswers, path.parent / design.synthetic)
-    with _named(path.parent / design.synthetic):
+    with said_of(path.parent / design.synthetic):
         check_laws(design, laws, plans)
     return replace(setup, laws=_with_tables(path, design, laws))
 
@@ -126,15 +119,6 @@ def _table_rows(path: Path, law: TableLaw, columns: tuple[str, ...]) -> tuple[di
         raise ConfigError(f"{table}: cannot be read ({why_unread(error)}); the law's key `file` names it") from error
 
 
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """What goes wrong inside is said of a file."""
-    try:
-        yield
-    except ConfigError as error:
-        raise ConfigError(at_key(path, str(error))) from error
-
-
 def load_gun(path: Path) -> GunConfig:
     """A gun's config."""
     if not path.is_file():
@@ -156,59 +140,6 @@ def _answer_rows(table: Path, lines: Any, columns: tuple[str, ...]) -> Iterator[
         if len(row) != len(columns):
             raise ConfigError(f"{table}: line {lines.line_num}: {len(row)} fields; there must be {len(columns)}")
         yield dict(zip(columns, map(unguard, row), strict=True))
-
-
-def check_limits(setup: Setup[DesignConfig]) -> None:
-    """Each cell of a design within the limits, its trains as well. `ConfigError` with cell, value and limit."""
-    trial = setup.config.trial
-    with _named(setup.source):
-        for cell in limits(setup.config, setup.gun):
-            every_s = dict(cell.levels).get(TRAIN_INTERVAL, trial.repeat_every_s)
-            if trial.kind == "train" and isinstance(every_s, float):
-                _check_train(cell, every_s, trial.max_shots)
-
-
-def check_methods(gun: GunConfig, methods: tuple[str, ...], source: Path) -> None:
-    """Methods of a gun that can be run: within the limits, and moving. `ConfigError` names file, method and rule."""
-    for name, method in gun.renderings(methods).items():
-        try:
-            rendering = rendering_of(method)
-        except LimitError as error:
-            raise ConfigError(at_key(source, f"methods.{name}: {error}")) from error
-        if isinstance(method, GunParameters) and rendering.motion == "no-break-away":
-            raise ConfigError(at_key(source, f"methods.{name}: {_never_moves(method)}"))
-
-
-def _never_moves(gun: GunParameters) -> str:
-    """Why no shot of a gun ever moves: what holds the standing magnet, and what the coil pulls with at the most.
-
-    Held by k x_0 + F_f; pulled by k_m i, where i = V/R (1 - exp(-R t/L)) is largest at the end of the pulse.
-    """
-    held_N = gun.stiffness_N_m * gun.preload_length_m + gun.friction_N
-    share = -math.expm1(-gun.resistance_ohm * gun.pulse_s / gun.inductance_H)
-    pull_N = gun.motor_constant_N_A * gun.voltage_V / gun.resistance_ohm * share
-    return (
-        f"no shot ever moves the magnet, by the model: spring and friction hold it with {held_N:.4g} N "
-        f"(friction_N {gun.friction_N:g}), and the coil pulls with {pull_N:.4g} N at the most (voltage_V "
-        f"{gun.voltage_V:g} for pulse_s {gun.pulse_s:g}); lower the friction, or raise the voltage or the pulse"
-    )
-
-
-def _check_train(cell: ConditionLimits, every_s: float, shots: int) -> None:
-    history = DriveHistory()
-    try:
-        for start_s in (shot * every_s for shot in range(min(shots, _ENOUGH_SHOTS))):
-            history = history.record(cell.load, start_s, start_s + cell.settle_s)
-    except LimitError as error:
-        raise ConfigError(
-            f"trial.repeat_every_s = {every_s:g}: {shown_cell(cell.levels)} needs {cell.settle_s:.4g} s until its "
-            f"magnet is home, and no more than {MAX_SHOTS_PER_MINUTE} shots a minute are allowed ({error}); repeat "
-            "more slowly"
-        ) from error
-
-
-_ENOUGH_SHOTS = 2 * MAX_SHOTS_PER_MINUTE
-"""A train that keeps the limits for so long keeps them for ever, but for the coil, which is warm by then as well."""
 
 
 def language_key(setup: Setup[DesignConfig]) -> str:

@@ -13,6 +13,7 @@ from device.plugin.guard import interrupts_held
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.limits import check_limits
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of, practice_of
 from experiments.design.shown_texts import setup_in
@@ -20,7 +21,6 @@ from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import generator
 from experiments.earlier_run import EarlierRun, earlier_run, give_way, resumed_plan, what_changed, words_shown
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.load import check_limits
 from experiments.rebuild import table
 from experiments.record import replay
 from experiments.record.journal import (

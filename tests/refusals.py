@@ -9,7 +9,8 @@ from typing import NamedTuple
 import pytest
 
 from experiments.config.door import ConfigError
-from experiments.load import check_limits, load_setup
+from experiments.design.limits import check_limits
+from experiments.load import load_setup
 
 
 class Broken(NamedTuple):

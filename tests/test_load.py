@@ -10,8 +10,8 @@ from analysis.predict.check import check
 from device.words import Pulse
 from experiments.config.door import ConfigError, read_toml
 from experiments.config.findings import line_of
-from experiments.design.stimuli import limits
-from experiments.load import check_limits, find, load_gun, load_setup, load_study, shipped_folder
+from experiments.design.limits import check_limits, limits
+from experiments.load import find, load_gun, load_setup, load_study, shipped_folder
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 from tests.designs import OF_THE_PAPER, SHIPPED
 from tests.refusals import Broken, check_refused, edit, line, refusal

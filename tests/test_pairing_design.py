@@ -18,9 +18,10 @@ from analysis.predict.check_design import check_design
 from experiments.config.door import ConfigError, checked_table
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.limits import check_limits
 from experiments.design.planning import plan_of
 from experiments.design.stimuli import settings
-from experiments.load import check_limits, load_gun, load_setup, shipped_folder
+from experiments.load import load_gun, load_setup, shipped_folder
 from experiments.rebuild import rebuild
 from experiments.record.journal import read_journal
 from experiments.record.replay import history

@@ -188,7 +188,7 @@ def test_a_list_of_wrong_elements_is_not_said_to_be_too_short() -> None:
 
 
 def test_a_grid_beyond_the_gun_is_refused_with_its_limit() -> None:
-    from experiments.load import check_limits
+    from experiments.design.limits import check_limits
 
     levels = {"minimum": 20.0, "maximum": 25.0, "grain": 1.0}
     wide = {"threshold": {"minimum": 18.0, "maximum": 26.0, "points": 9}}

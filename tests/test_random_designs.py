@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 
 from experiments.config.door import ConfigError
+from experiments.design.limits import limits
 from experiments.design.plan import Plan
 from experiments.design.planned import planned_run
 from experiments.design.planning import groups, plan_of, square_size
-from experiments.design.stimuli import limits
 from experiments.load import load_gun, shipped_folder
 from experiments.record.design_columns import columns
 from experiments.record.design_table import design_rows

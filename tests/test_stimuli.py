@@ -7,6 +7,7 @@ import pytest
 from device.words import Effect, Pulse
 from experiments.config.door import ConfigError
 from experiments.design import stimuli
+from experiments.design.limits import limits
 from experiments.design.planning import plan_of
 from experiments.load import load_gun, shipped_folder
 from tests.designs import design
@@ -111,7 +112,7 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
 )
 def test_what_the_gun_cannot_do_is_refused_by_name(gun, factors, said):
     with pytest.raises(ConfigError) as raised:
-        stimuli.limits(design(factors=factors), gun)
+        limits(design(factors=factors), gun)
     assert said in str(raised.value)
 
 
@@ -146,12 +147,12 @@ def test_a_hand_sets_numbers_that_the_model_is_told_or_that_are_called_otherwise
         }
     )
     assert stimuli.by_hand(config) == ("voltage_dial", "pads", "direction_of_gaze")
-    assert {cell.drive.voltage_V for cell in stimuli.limits(config, gun)} == {8.0, 12.0}
+    assert {cell.drive.voltage_V for cell in limits(config, gun)} == {8.0, 12.0}
 
 
 def test_below_break_away_is_listed_where_the_design_asks_for_it(gun):
     config = design(below_break_away=True, factors={"method": STRONG, "voltage_V": {"levels": [0.5, 16.0]}})
-    assert [one.status for one in stimuli.limits(config, gun)] == ["no-break-away", "home"]
+    assert [one.status for one in limits(config, gun)] == ["no-break-away", "home"]
 
 
 @pytest.mark.parametrize(("standard", "shown"), [(12.0, [8.0, 16.0, 12.0]), (16.0, [8.0, 16.0])])
@@ -160,4 +161,4 @@ def test_a_standard_stands_once_behind_the_levels_that_are_told_from_it(gun, sta
     trial = {"kind": "two-interval", "compare": "voltage_V", "standard": standard}
     asked = {"kind": "choice", "text": "?", "answers": ["first", "second"], "correct": "larger"}
     config = design(factors=factors, trial=trial, questions={"q": asked})
-    assert [cell.drive.voltage_V for cell in stimuli.limits(config, gun)] == shown
+    assert [cell.drive.voltage_V for cell in limits(config, gun)] == shown

@@ -8,8 +8,8 @@ from collections import defaultdict
 import pytest
 
 from experiments.config.door import ConfigError, checked_table, load
-from experiments.design import stimuli
 from experiments.design.config import DesignConfig
+from experiments.design.limits import limits
 from experiments.design.planning import groups, plan_of, square_size
 from experiments.load import load_gun
 from experiments.record import design_columns
@@ -47,7 +47,7 @@ def test_it_fits_its_gun_and_its_people_answer_every_question(name):
     design, gun, laws = loaded(name)
     assert design.design == name
     check_laws(design, laws)
-    assert all(one.status in {"home", "rendered"} for one in stimuli.limits(design, gun))
+    assert all(one.status in {"home", "rendered"} for one in limits(design, gun))
     assert len(design_columns.columns(design)) > 8
     for _, plan, person in people(name, 2):
         assert len(plan.trials) == TRIALS[name]

@@ -11,7 +11,7 @@ from analysis.archive.preregistration_page import Planned, page
 from analysis.report.serial import as_json
 from analysis.summary.planned_files import planned_files
 from experiments.clock import Clock
-from experiments.load import check_limits
+from experiments.design.limits import check_limits
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.record.provenance import provenance

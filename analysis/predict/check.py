@@ -15,7 +15,8 @@ from device.words import how_many
 from experiments.config.door import ConfigError, EligibilityConfig, at_key, participant_codes, read_toml
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.load import check_methods, find, load_gun, load_setup, load_study
+from experiments.design.limits import check_methods
+from experiments.load import find, load_gun, load_setup, load_study
 from experiments.study.preregistration import JOURNALS, FreezeStatus, carried_by, numbers_there
 
 EXAMPLE_SEED = 1

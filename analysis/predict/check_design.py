@@ -20,6 +20,7 @@ from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import DRIVEN, INTERVAL_NAMES, NO, shown_level
+from experiments.design.limits import ConditionLimits, check_limits, limits
 from experiments.design.methods_section import methods_section
 from experiments.design.plan import Condition, Plan
 from experiments.design.planned import (
@@ -33,8 +34,8 @@ from experiments.design.planned import (
 )
 from experiments.design.planning import groups, plan_of, practice_of, square_size
 from experiments.design.procedures.config import PairingConfig
-from experiments.design.stimuli import ConditionLimits, limits, settings, stimulus
-from experiments.load import check_limits, language_key
+from experiments.design.stimuli import settings, stimulus
+from experiments.load import language_key
 from experiments.study.preregistration import FreezeStatus
 from experiments.synthetic.answers import synthetic_participant_of
 from experiments.synthetic.laws import DiffusionLaw, SyntheticAnswers, far_thresholds, superfluous

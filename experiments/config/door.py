@@ -11,6 +11,7 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -168,6 +169,15 @@ def at_key(path: Path, message: str) -> str:
     """A message about a file, with the line of the key that the message begins with, if it does with one."""
     line = line_of(read_text(path), keys_in(message))
     return f"{path}{f':{line}' if line else ''}: {message}"
+
+
+@contextmanager
+def said_of(path: Path) -> Iterator[None]:
+    """What goes wrong inside is said of a file."""
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(at_key(path, str(error))) from error
 
 
 Order = Literal["random", "williams", "latin-square"]

@@ -11,8 +11,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import cast
 
-from device.limits import Load
-from device.methods import Method, drive_of, rendering_of
+from device.methods import Method, drive_of
 from device.parameters import VibrationParameters
 from device.words import Direction, Drive, LimitError, Shot
 from experiments.config.door import ConfigError
@@ -43,21 +42,6 @@ class IntervalStimulus:
     direction: Direction
     parameters: Method
     drive: Drive
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConditionLimits:
-    """What a shot of a cell asks of the gun; `status` is the model's: `home`, `no-break-away`, or `rendered`.
-
-    `peak_force_N`: on the hand, by the model; `None` of a vibration.
-    """
-
-    levels: Condition
-    drive: Drive
-    load: Load
-    status: str
-    settle_s: float
-    peak_force_N: float | None
 
 
 def damper(gun: GunConfig, method: str) -> tuple[tuple[str, str], ...]:
@@ -115,7 +99,7 @@ class Stimuli:
 def stimuli_of(design: DesignConfig, gun: GunConfig) -> Stimuli:
     """The stimuli of a design. `ConfigError` as `limits`."""
     names: dict[Method, str] = {}
-    for levels in dict.fromkeys(_shot_cells(design)):
+    for levels in dict.fromkeys(shot_cells(design)):
         found = stimulus(design, gun, levels)
         names.setdefault(_undriven(found, gun), _name(found, gun, len(names)))
 
@@ -162,7 +146,7 @@ def stimulus(design: DesignConfig, gun: GunConfig, levels: Condition) -> Interva
     try:
         drive = drive_of(parameters)
     except LimitError as error:
-        raise _beyond(design, levels, str(error)) from error
+        raise beyond_limits(design, levels, str(error)) from error
     return IntervalStimulus(
         method=method,
         direction=cast("Direction", held.get(DIRECTION_FACTOR, "forward")),
@@ -224,43 +208,8 @@ def _changed(parameters: Method, numbers: Mapping[str, tuple[str, float]], metho
     return parameters
 
 
-def unchanged_methods(design: DesignConfig) -> tuple[str, ...]:
-    """The methods that a design takes as the gun has them: all, or none where a factor changes its numbers."""
-    changed = any(name in GUN_NUMBERS or factor.sets for name, factor in design.factors.items())
-    return () if changed else design.methods
-
-
-def limits(design: DesignConfig, gun: GunConfig) -> list[ConditionLimits]:
-    """What every cell asks of the gun. `ConfigError`: one is beyond a limit, never comes home, or never moves.
-
-    A cell whose magnet never moves is let through by a design that says `below_break_away = true`. `ConfigError`, too,
-    where a hand would have to set what a procedure chooses.
-    """
-    found = [_limits_of(design, gun, levels) for levels in dict.fromkeys(_shot_cells(design))]
-    _check_hands(design, gun)
-    return found
-
-
-def _check_hands(design: DesignConfig, gun: GunConfig) -> None:
-    """What is chosen after an answer comes too late for a hand that sets the gun before."""
-    by_others: dict[Condition, dict[tuple[tuple[str, str], ...], str]] = {}
-    for levels in _shot_cells(design) if design.adapted else ():
-        others = tuple(pair for pair in levels if pair[0] not in design.adapted)
-        by_others.setdefault(others, {}).setdefault(settings(design, gun, levels), shown_cell(levels))
-    for found in (found for found in by_others.values() if len(found) > 1):
-        (one, cell), (other, other_cell) = [*found.items()][:2]
-        name, *_ = design.adapted
-        raise ConfigError(
-            f"factors.{name}.levels: a procedure chooses them after an answer, when hands have set the gun, and "
-            f"{cell} has {_hand_words(one)}, {other_cell} {_hand_words(other)}; take levels that are set alike"
-        )
-
-
-def _hand_words(held: tuple[tuple[str, str], ...]) -> str:
-    return ", ".join(f"{name} {level}" for name, level in held) or "nothing to set"
-
-
-def _shot_cells(design: DesignConfig) -> Iterator[Condition]:
+def shot_cells(design: DesignConfig) -> Iterator[Condition]:
+    """The levels of everything that may be fired in a design, standards too."""
     names = [
         name
         for name in design.factors
@@ -274,30 +223,7 @@ def _shot_cells(design: DesignConfig) -> Iterator[Condition]:
             yield from (_with(levels, design.trial.compare, standard) for levels in found)
 
 
-def _limits_of(design: DesignConfig, gun: GunConfig, levels: Condition) -> ConditionLimits:
-    shot = stimulus(design, gun, levels)
-    try:
-        rendering = rendering_of(shot.parameters)
-    except LimitError as error:
-        raise _beyond(design, levels, str(error)) from error
-    if rendering.motion == "no-break-away" and not design.below_break_away:
-        raise _beyond(
-            design,
-            levels,
-            "no shot of it ever moves the magnet, by the model; raise the voltage or the pulse; or, if that is what "
-            "you study, write `below_break_away = true` on top of the design's file, above its first [table]",
-        )
-    return ConditionLimits(
-        levels=levels,
-        drive=shot.drive,
-        load=rendering.load,
-        status=rendering.motion,
-        settle_s=rendering.settle_s,
-        peak_force_N=rendering.peak_force_N,
-    )
-
-
-def _beyond(design: DesignConfig, levels: Condition, why: str) -> ConfigError:
+def beyond_limits(design: DesignConfig, levels: Condition, why: str) -> ConfigError:
     """That a cell cannot be fired, at the key of the first factor that says a number of the gun; else of the method."""
     numbers = (name for name, factor in design.factors.items() if name in GUN_NUMBERS or factor.sets)
     return ConfigError(f"factors.{next(numbers, METHOD_FACTOR)}.levels: {shown_cell(levels)}: {why}")
