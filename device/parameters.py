@@ -9,7 +9,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
-from device.words import MAX_EFFECT, is_finite, is_whole_number, shown
+from device.values import is_finite, is_whole_number, shown
+from device.words import MAX_EFFECT
 
 DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]

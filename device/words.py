@@ -6,14 +6,11 @@ and no config can lift the limit.
 
 from __future__ import annotations
 
-import math
-import re
-import signal
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from numbers import Integral, Real
-from typing import Literal, Protocol, TypeGuard, get_args
+from typing import Literal, Protocol, get_args
+
+from device.messages import RecoilError
+from device.values import is_number, is_whole_number, shown
 
 Direction = Literal["forward", "backward"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -24,106 +21,6 @@ MAX_PULSE_S = 0.020
 """Longest pulse, assumed: twice the paper's 10 ms."""
 MAX_EFFECT = 123
 """Waveforms in the library of the vibration driver (DRV2605)."""
-
-
-QUOTED = 200
-"""Characters of a value that a message quotes."""
-_LONG_QUOTE = re.compile(rf"""(?<!\w)(['"])([^'"\n]{{{QUOTED}}})[^'"\n]+\1(?!\w)""")
-_LONG_WORD = re.compile(rf"([^\s/\\]{{{QUOTED}}})[^\s/\\]{{100,}}")
-_PARTICULARS = re.compile(r"""'[^'\n]*'|"[^"\n]*"|\S*[/\\]\S*|\S+\.[a-z]\w*|\d[\d.,]*""")
-_LIKE = 5
-
-
-def cut_values(message: str) -> str:
-    """A message with long values, in quotes or in one word, cut; names of files, at most 255 characters, stay whole.
-
-    >>> len(cut_values(f"{'9' * 5000} is no trial"))
-    231
-    """
-    short = _LONG_QUOTE.sub(lambda found: f"{found[1]}{found[2]}… ({len(found[0]) - 2} characters){found[1]}", message)
-    return _LONG_WORD.sub(lambda found: f"{found[1]}… ({len(found[0])} characters)", short)
-
-
-def few_of_each(messages: Iterable[str]) -> Iterator[str]:
-    """The first five messages of each kind, and how many more there are: files, numbers and quotes make no kind.
-
-    >>> list(few_of_each(f"P{n}: no answer" for n in range(200)))[-2:]
-    ['P4: no answer', '... and 195 more like it']
-    >>> list(few_of_each(["a", *(f"P{n}: edited; `recoil rebuild /x/{n}` helps" for n in range(7))]))[-1]
-    '... and 2 more like it (edited)'
-    >>> list(few_of_each(["a", *(f"or P{n}, and P{n} beside it" for n in range(7))]))[-1]
-    '... and 2 more like it'
-    """
-    seen: Counter[str] = Counter()
-    for message in messages:
-        kind = _PARTICULARS.sub(_ANY, message)
-        seen[kind] += 1
-        if seen[kind] <= _LIKE:
-            yield message
-    for kind, count in seen.items():
-        if count > _LIKE:
-            said = _whole_clause(kind) if len(seen) > 1 else ""
-            yield f"... and {count - _LIKE} more like it{f' ({said})' if said else ''}"
-
-
-_ANY = "\0"
-"""Stands where messages of a kind have names, numbers and quotes of their own."""
-_ASIDE = re.compile(r" \([^()]*\)")
-
-
-def _whole_clause(kind: str) -> str:
-    """The first clause behind the place that all messages of a kind share to the letter; empty if each has a hole."""
-    clauses = [one.strip() for one in re.split(r"[:;]\s", _ASIDE.sub("", kind))]
-    first = next((number for number, one in enumerate(clauses) if _ANY in one), 0)
-    shared = (one.removeprefix(_ANY).strip() for one in clauses[first:])
-    return next((one for one in shared if one and not set(one) & {_ANY, "(", ")"} and one.count("`") % 2 == 0), "")
-
-
-def escaped(text: str, kept: str = "") -> str:
-    r"""A text whose characters that break a line or steer a terminal are escapes; those that are `kept` stay.
-
-    >>> escaped("a\r\nb\x1b[2J"), escaped("a\tb\n", kept="\t\n")
-    ('a\\r\\nb\\x1b[2J', 'a\tb\n')
-    """
-    return _STEERING.sub(lambda found: found[0] if found[0] in kept else ascii(found[0])[1:-1], text)
-
-
-_STEERING = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
-
-
-def first_few(names: Sequence[object], most: int) -> str:
-    """The first names of a list, and how many more there are.
-
-    >>> first_few(["P1", "P2", "P3"], 2), first_few(["P1", "P2"], 2)
-    ('P1, P2 and 1 more', 'P1, P2')
-    """
-    more = f" and {len(names) - most:,} more" if len(names) > most else ""
-    return ", ".join(map(str, names[:most])) + more
-
-
-def how_many(number: int, noun: str) -> str:
-    """So many of them; a noun of several words has its plural at its end.
-
-    >>> how_many(1, "log file"), how_many(1_200, "log file")
-    ('1 log file', '1,200 log files')
-    """
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
-
-
-class RecoilError(Exception):
-    """Anything that goes wrong and has a message for people: the root of all errors of this product.
-
-    A value that the message quotes is cut at 200 characters.
-
-    >>> try:
-    ...     raise LimitError("voltage_V is 30; it must be a number between 0 and 24")
-    ... except RecoilError as error:
-    ...     print(error)
-    voltage_V is 30; it must be a number between 0 and 24
-    """
-
-    def __init__(self, *args: object) -> None:
-        super().__init__(*(cut_values(one) if isinstance(one, str) else one for one in args))
 
 
 class DeviceError(RecoilError):
@@ -140,65 +37,6 @@ class LimitError(DeviceError, ValueError):
 
 class LinkError(DeviceError):
     """The gun did not answer, or not in its language."""
-
-
-_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last: Ctrl+Break on Windows
-INTERRUPTS = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
-"""The signals that end a command in order; no system knows all of them."""
-AWAKE_S = 0.2
-"""Who may wait long looks up so often. On Linux a thread that is being started may take a signal that was meant for the
-main thread, which then sleeps on: Ctrl+C would do nothing until it wakes.
-"""
-
-
-def said_by(error: BaseException) -> str:
-    r"""What an exception of somebody else's code says, on one line that can be shown and written down.
-
-    >>> said_by(ValueError("no\n\x1b[2Jcard\udcff")), said_by(SystemExit())
-    ('ValueError: no \\x1b[2Jcard\\udcff', 'SystemExit')
-    """
-    text = error_line(error)
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
-def error_line(error: BaseException) -> str:
-    """The same without the kind of exception; empty where it says nothing."""
-    try:
-        text = " ".join(str(error).split())
-    except Exception:  # noqa: BLE001 - it says nothing
-        return ""
-    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
-
-
-def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a real number: of Python or numpy, whole or not, but neither true nor false, nor text.
-
-    >>> is_number(1), is_number(True), is_number("1")
-    (True, False, False)
-    """
-    return type(value) is float or (isinstance(value, Real) and not isinstance(value, bool))
-
-
-def is_finite(value: object) -> TypeGuard[float]:
-    """Whether a value is a number within a float's range.
-
-    >>> is_finite(1), is_finite(float("nan")), is_finite(10**400), is_finite(None)
-    (True, False, False, False)
-    """
-    try:
-        return is_number(value) and math.isfinite(value)
-    except OverflowError:  # a whole number beyond all floats
-        return False
-
-
-def is_whole_number(value: object) -> TypeGuard[int]:
-    """Whether a value is a whole number by its type: 1 is, 1.0 and true are not."""
-    return isinstance(value, Integral) and not isinstance(value, bool)
-
-
-def shown(value: object) -> str:
-    """A value as an error names it: a number as it is, anything else so that text is told from a number."""
-    return f"{value}" if is_number(value) else f"{value!r}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from contextlib import suppress
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Protocol
 
+from device.interrupts import AWAKE_S
 from device.machine_clock import machine_s
-from device.words import AWAKE_S
 
 
 class Clock(Protocol):

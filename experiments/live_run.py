@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import NoReturn, Protocol
 
 from device import DeviceError, Gun, GunStatus
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.clock import Clock
 from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalError, JournalGone

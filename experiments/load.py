@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from device.words import escaped
+from device.messages import escaped
 from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, said_of, why_unread
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig

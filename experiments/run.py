@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from device import DeviceError, Gun, open_gun
-from device.plugin.guard import interrupts_held
+from device.interrupts import interrupts_held
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig

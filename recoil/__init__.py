@@ -14,9 +14,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from device.messages import RecoilError
     from device.parameters import GunParameters
     from device.physics import simulate
-    from device.words import RecoilError
     from recoil.api import analyze, audit, load_config, plan, power, read_logs, run_synthetic
 
     __version__: str

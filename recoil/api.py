@@ -143,7 +143,7 @@ def analyze(
     from analysis.summary.request_data import answers_to
     from analysis.summary.requests import Requests
     from analysis.summary.summary import summarize
-    from device.words import few_of_each
+    from device.messages import few_of_each
     from experiments.config.door import load
     from recoil.arguments import file_of, flag_of
 

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 
-from device.words import RecoilError, is_number, is_whole_number
+from device.messages import RecoilError
+from device.values import is_number, is_whole_number
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.load import find

@@ -18,7 +18,8 @@ import typer
 import recoil
 from analysis.report.streams import forgive_streams, keep_results_apart
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
-from device.words import INTERRUPTS, RecoilError, few_of_each
+from device.interrupts import INTERRUPTS
+from device.messages import RecoilError, few_of_each
 from recoil.commands import archives, guns, numbers, predictions, sessions
 
 app = typer.Typer(

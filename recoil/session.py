@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.report.terminal import say
+from device.messages import few_of_each, how_many, said_by
 from device.serial_gun.gun import speed_of
-from device.words import few_of_each, how_many, said_by
 from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.door import ConfigError

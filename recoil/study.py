@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from analysis.report.section import Section, Table
 from analysis.report.terminal import with_tables
-from device.words import how_many
+from device.messages import how_many
 from experiments.clock import RealClock, date_text
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, open_study, overview

@@ -25,8 +25,8 @@ from analysis.logs.level_map import LevelMap
 from analysis.logs.reading import read_logs
 from analysis.paper.audit.run import PaperFile, audit
 from analysis.summary.remarks_coding import WrittenRemark, code_remarks, load_codebook
+from device.messages import RecoilError
 from device.wire import records
-from device.words import RecoilError
 from experiments.config.door import Model, StudyConfig, load
 from experiments.config.setup import GunConfig, sha256
 from experiments.config.toml_text import toml_text

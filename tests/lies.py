@@ -22,7 +22,7 @@ from analysis.logs.reading import Logs, read_logs
 from analysis.paper.audit.run import audit_file
 from analysis.summary.remarks_coding import load_codebook
 from analysis.summary.summary import summarize
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.clock import VirtualClock
 from experiments.config.door import load
 from experiments.load import load_setup

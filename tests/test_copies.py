@@ -10,7 +10,7 @@ import pytest
 from analysis.report import copies as module
 from analysis.report.copies import cores, in_copy, process_copies
 from analysis.report.terminal import Tell
-from device.words import RecoilError
+from device.messages import RecoilError
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no copies of a process on this system")

@@ -11,7 +11,7 @@ from analysis.logs.patterns import group_in, holding
 from analysis.logs.reading import read_logs
 from analysis.paper.audit.run import PaperFile, load_paper_file
 from analysis.summary.remarks_coding import Codebook
-from device.words import RecoilError, few_of_each
+from device.messages import RecoilError, few_of_each
 from experiments.config.door import ConfigError, checked_table, tables
 
 BOMB, CAMEL = "(a+)+$", "a" * 5_000 + "!"

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from device import Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, open_gun
+from device import Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport, interrupts, open_gun
 from device.methods import drive_of, paper_methods
 from device.parameters import GunParameters
 from device.plugin import door, guard
@@ -681,7 +681,7 @@ def test_a_plug_in_that_breaks_off_is_a_link_that_failed(clock, acts):
 @pytest.mark.slow
 def test_a_signal_that_another_thread_takes_wakes_who_waits_for_a_plug_in():
     with stolen_signal(), pytest.raises(Told):
-        guard.answer_within(PATIENCE_S, threading.Event().wait)
+        interrupts.answer_within(PATIENCE_S, threading.Event().wait)
 
 
 def test_a_plug_in_that_is_silent_is_asked_no_more_but_still_disarmed(clock, monkeypatch):
@@ -807,7 +807,7 @@ def test_who_closes_a_gun_that_another_is_closing_learns_what_became_of_it(clock
     begun, on = threading.Event(), threading.Event()
     gun, _ = guarded(clock, disarms=lambda: (begun.set(), on.wait(PATIENCE_S)))
     closing: Future[None] = Future()
-    guard.begin_aside(closing, gun.close, "closing")
+    interrupts.begin_aside(closing, gun.close, "closing")
     begun.wait(PATIENCE_S)
     with pytest.raises(PluginError, match=r"gun plug-in liar .*was not disarmed and closed"):
         gun.close()

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
+from device.messages import RecoilError
 from device.physics import FIDELITIES, GunParameters, ShotBatch, batch, compiled_simulator, simulate, simulate_batch
-from device.words import RecoilError
 
 NUMBERS = [field.name for field in dataclasses.fields(ShotBatch) if field.name != "status"]
 

@@ -15,7 +15,7 @@ from analysis.report import placing
 from analysis.summary import analyze as feature
 from analysis.summary.analyze import Request, analyze
 from analysis.summary.sections import sections
-from device.words import RecoilError
+from device.messages import RecoilError
 from tests.log_files import tree, write_study
 
 RECORD = "statistics.json"

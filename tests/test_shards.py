@@ -18,7 +18,7 @@ from analysis.predict.power.grid import Chunk, PowerRequest, make_grid, run_chun
 from analysis.predict.power.planned import Tally
 from analysis.predict.power.shards import Job, Shard, ShardNumber, read_shard, write_shard
 from analysis.report.terminal import unseen
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.config.door import ConfigError
 from tests.power_files import files
 

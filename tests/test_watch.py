@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.record import storage, tail
 from experiments.record.journal import JournalError
 from experiments.record.tail import JournalTail

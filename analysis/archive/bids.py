@@ -21,7 +21,7 @@ import pandas as pd
 from analysis.logs.cell_rules import as_moment
 from analysis.logs.reading import Logs
 from analysis.logs.texts import Cell
-from device.words import how_many
+from device.messages import how_many
 from experiments.design.units import long_name
 from experiments.record import tables
 from experiments.record.design_columns import columns

@@ -13,7 +13,7 @@ from analysis.logs.column_map import ColumnMap, scale_of_others
 from analysis.logs.journals import journal_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.report import placing
-from device.words import first_few
+from device.messages import first_few
 from experiments.config.door import load
 from experiments.load import load_study
 from experiments.record import storage

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from analysis.archive.contents import CONTENTS, MEANINGS, Entry
 from analysis.archive.manifest import MANIFEST_FILE
 from analysis.report.section import Section, Table
-from device.words import how_many
+from device.messages import how_many
 from experiments.config.setup import GunConfig
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import methods_section

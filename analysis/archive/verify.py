@@ -24,7 +24,7 @@ from analysis.report import placing
 from analysis.report.serial import as_json
 from analysis.summary.analyze import result_files
 from analysis.summary.results import STATISTICS_FILE
-from device.words import RecoilError, escaped
+from device.messages import RecoilError, escaped
 from experiments.rebuild import rebuild, shots_path, shots_table
 from experiments.record import journal, storage
 from experiments.record.lines import strict_json

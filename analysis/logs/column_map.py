@@ -34,7 +34,7 @@ from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from analysis.logs.texts import CsvRecord
-from device.words import first_few
+from device.messages import first_few
 from experiments.config.door import Model, once
 from experiments.config.lines import LineText
 from experiments.design.language import NumberScale

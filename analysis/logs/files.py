@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from device.words import RecoilError, escaped
+from device.messages import RecoilError, escaped
 from experiments.record import storage, tables
 
 ARCHIVE_FILE = "archive.json"

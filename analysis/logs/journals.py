@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
-from device.words import first_few, how_many
+from device.messages import first_few, how_many
 from experiments.rebuild import JOURNAL_NAME, began_with, misnamed, rows_beyond, table
 from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError

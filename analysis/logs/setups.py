@@ -9,7 +9,7 @@ from pathlib import Path
 
 from analysis.logs.files import Problem
 from analysis.logs.journals import journal_of
-from device.words import first_few, how_many
+from device.messages import first_few, how_many
 from experiments.record import journal
 from experiments.record.journal import JournalError
 from experiments.record.tables import DataKind

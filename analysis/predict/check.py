@@ -11,7 +11,7 @@ from analysis.predict.check_design import AS_FROZEN, DesignCheck, check_design, 
 from analysis.report.section import Section
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text, with_tables
-from device.words import how_many
+from device.messages import how_many
 from experiments.config.door import ConfigError, EligibilityConfig, at_key, participant_codes, read_toml
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig

@@ -13,8 +13,9 @@ from analysis.predict.exposure import Exposure, exposure
 from analysis.report.section import Section, Table
 from analysis.report.serial import OPTIONAL, written
 from device.limits import MAX_COIL_C, MAX_DUTY, MAX_SHOTS_PER_MINUTE
+from device.messages import how_many
 from device.methods import Method
-from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse, how_many
+from device.words import MAX_PULSE_S, MAX_VOLTAGE_V, Pulse
 from experiments.catalogues.catalogue import language
 from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup

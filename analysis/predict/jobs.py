@@ -23,7 +23,7 @@ from multiprocessing import get_context, parent_process
 from typing import Any
 
 from analysis.report.copies import no_interrupt
-from device.words import said_by
+from device.messages import said_by
 from experiments.config.door import ConfigError
 from experiments.record.provenance import recoil_version, versions
 

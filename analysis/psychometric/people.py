@@ -13,7 +13,7 @@ from analysis.psychometric.priors import Priors
 from analysis.report.serial import OPTIONAL, UNWRITTEN
 from analysis.stats.arrays import FloatArray
 from analysis.stats.frames import Result
-from device.words import how_many
+from device.messages import how_many
 
 FEWEST_ANSWERS = 10
 """Fewer trials than this are not fitted (assumed): a function has three parameters or four."""

@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
 from analysis.report.terminal import Tell, untold
-from device.words import RecoilError
+from device.messages import RecoilError
 
 Work = Callable[[Tell], object]
 """Is given somebody to tell of each part that is done."""

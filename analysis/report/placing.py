@@ -15,7 +15,7 @@ from pathlib import Path
 from analysis.report.copies import no_interrupt
 from analysis.report.section import MAKER, REPORT_FILES
 from analysis.report.terminal import say
-from device.words import RecoilError, first_few
+from device.messages import RecoilError, first_few
 from experiments.record import storage
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2

@@ -9,7 +9,7 @@ import sys
 import unicodedata
 from typing import TextIO
 
-from device.words import escaped
+from device.messages import escaped
 
 _PLAIN = {
     **dict.fromkeys("−‐‑‒–—", "-"),

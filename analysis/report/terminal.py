@@ -17,7 +17,7 @@ from analysis.report.labels import text_columns
 from analysis.report.section import Section, Table
 from analysis.report.serial import as_json as in_json
 from analysis.report.streams import results, takes_all, visible
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.record import storage
 
 if TYPE_CHECKING:

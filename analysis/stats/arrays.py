@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from device.words import QUOTED
+from device.messages import QUOTED
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

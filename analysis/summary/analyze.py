@@ -34,7 +34,7 @@ from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import TABLE_FILES, result_tables
-from device.words import first_few
+from device.messages import first_few
 from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
 from experiments.design.language import METHOD_FACTOR

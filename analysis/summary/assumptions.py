@@ -13,7 +13,7 @@ from analysis.summary.results import (
     Supplement,
     WithinStatistics,
 )
-from device.words import first_few
+from device.messages import first_few
 
 EPSILON = 0.75
 """Below it the pooled Tukey test is not to be read: its familywise error grows to .064 at .72 and .088 at .45."""

@@ -14,7 +14,7 @@ from pydantic import JsonValue
 from analysis.logs.files import ARCHIVE_FILE
 from analysis.logs.journals import RunFile, journal_of, run_file
 from analysis.logs.reading import Logs
-from device.words import how_many
+from device.messages import how_many
 from experiments.config.door import read_toml
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError

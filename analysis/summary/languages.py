@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from analysis.logs.journals import RunFile
-from device.words import first_few
+from device.messages import first_few
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError, ShownLanguage
 

@@ -21,7 +21,7 @@ from analysis.summary.results import DesignSummary, Origin
 from analysis.summary.sections.pictures import functions_figure_of
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from analysis.summary.thresholds import LevelledAnswers, Thresholds, fitted_thresholds
-from device.words import how_many
+from device.messages import how_many
 from experiments.config.door import load
 from experiments.config.setup import sha256
 from experiments.record import storage

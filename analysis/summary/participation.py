@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut, by_rule
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
-from device.words import how_many
+from device.messages import how_many
 from experiments.study.study import by_code
 
 

@@ -32,7 +32,7 @@ from pydantic import Field, model_validator
 from analysis.logs.patterns import Pattern, holding
 from analysis.report import apa
 from analysis.report.section import Section, Table
-from device.words import how_many
+from device.messages import how_many
 from experiments.config.door import ConfigError, Model, load, why_unread
 
 _NonEmpty = Annotated[str, Field(min_length=1)]

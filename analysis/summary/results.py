@@ -27,7 +27,7 @@ from analysis.summary.remarks_coding import CodedRemarks
 from analysis.summary.requests import Requested
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
-from device.words import how_many
+from device.messages import how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import level_words
 from experiments.record.tables import DataKind

@@ -15,7 +15,7 @@ from analysis.stats.arrays import FloatArray, IndexArray
 from analysis.times.fit import BEYOND_INTERVAL, DiffusionFit, Estimate, fit
 from analysis.times.likelihood import LapseRange, Trials, trials_of
 from analysis.times.own_trials import OwnTrials, ordered, quantiles
-from device.words import how_many
+from device.messages import how_many
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

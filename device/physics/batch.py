@@ -21,6 +21,7 @@ from typing import Any, cast, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from device.messages import RecoilError, said_by
 from device.parameters import ABOVE_ZERO, GunParameters
 from device.physics.equations import (
     CLOSED_FORM,
@@ -37,7 +38,6 @@ from device.physics.equations import (
     pack,
 )
 from device.physics.shot import ShotSummary, interpret, summary_from
-from device.words import RecoilError, said_by
 
 Records = NDArray[Any]
 """Arrays whose fields are those of `Constants`, or of `ShotResult`."""

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from device.messages import cut_values
 from device.parameters import GunParameters
-from device.words import cut_values
 
 ORDER = 24
 """Of the Taylor series. Measured: orders 20 to 28 take the same time within 15 %, 24 the least."""

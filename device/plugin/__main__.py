@@ -6,8 +6,8 @@ import inspect
 import os
 import sys
 
+from device.messages import said_by
 from device.plugin.door import IMPORTED, entry_of
-from device.words import said_by
 
 
 def main(name: str) -> int:

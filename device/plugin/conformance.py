@@ -17,24 +17,14 @@ from dataclasses import dataclass
 from itertools import cycle, islice
 
 from device import open_gun
+from device.interrupts import answer_within, interrupts_held, start_aside
 from device.machine_clock import machine_s
+from device.messages import said_by
 from device.methods import Method, drive_of, paper_methods
-from device.plugin.guard import GunLeftOpen, PluginSilent, answer_within, interrupts_held, start_aside
+from device.plugin.guard import GunLeftOpen, PluginSilent
 from device.plugin.reports import CLOCK_SLACK_S, LENGTH_SLACK_PART, LENGTH_SLACK_S
 from device.serial_gun.gun import speed_of
-from device.words import (
-    DIRECTIONS,
-    DeviceError,
-    Effect,
-    Gun,
-    GunStatus,
-    LimitError,
-    LinkError,
-    Pulse,
-    Shot,
-    ShotReport,
-    said_by,
-)
+from device.words import DIRECTIONS, DeviceError, Effect, Gun, GunStatus, LimitError, LinkError, Pulse, Shot, ShotReport
 
 FEW_TRIALS = 20
 EVERY_S = 0.205

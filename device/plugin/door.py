@@ -19,20 +19,12 @@ from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import Path
 from typing import cast
 
+from device.interrupts import answer_of, answer_within, begin_aside, interrupts_held, wait_awake
+from device.messages import error_line, said_by
 from device.methods import Method
 from device.own_process import own_environment, own_program
-from device.plugin.guard import (
-    DISARM_S,
-    GuardedGun,
-    GunLeftOpen,
-    PluginError,
-    answer_of,
-    answer_within,
-    begin_aside,
-    interrupts_held,
-    wait_awake,
-)
-from device.words import Gun, LinkError, error_line, said_by
+from device.plugin.guard import DISARM_S, GuardedGun, GunLeftOpen, PluginError
+from device.words import Gun, LinkError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

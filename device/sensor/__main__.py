@@ -12,6 +12,7 @@ from collections import deque
 import numpy as np
 
 from device.machine_clock import machine_s
+from device.messages import error_line, said_by
 from device.sensor.door import open_sensor
 from device.sensor.link import SensorSaid, asked_of, said_line
 from device.sensor.process import (
@@ -24,7 +25,7 @@ from device.sensor.process import (
     ShotAsked,
 )
 from device.sensor.streams import CsvSensor, Sensor, SensorError, checked_samples
-from device.words import DeviceError, error_line, said_by
+from device.words import DeviceError
 
 READ_EVERY_S = 0.005, 0.015
 """It is read at uneven times: a sensor whose batches come evenly would else always be heard equally late."""

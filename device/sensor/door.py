@@ -12,9 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import cast
 
+from device.messages import said_by
 from device.plugin.door import SENSOR_PLUGINS, check_commands, entry_of
 from device.sensor.streams import CsvSensor, Sensor, SensorError
-from device.words import DeviceError, said_by
+from device.words import DeviceError
 
 SENSOR_COMMANDS = {"read": 0, "close": 0}
 """What a sensor has, and how many parameters each is called with."""

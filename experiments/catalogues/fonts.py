@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from device.words import first_few
+from device.messages import first_few
 from experiments.catalogues.catalogue import ENGLISH, Language
 from experiments.config.door import ConfigError
 

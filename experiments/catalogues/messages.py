@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from string import Formatter
 
-from device.words import first_few
+from device.messages import first_few
 
 
 def _said(text: str, note: str) -> str:

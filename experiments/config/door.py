@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.config.findings import CODE_PREFIX, keys_in, line_of, validation_text
 
 SomeModel = TypeVar("SomeModel", bound=BaseModel)

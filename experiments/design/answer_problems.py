@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from device.words import first_few
+from device.messages import first_few
 from experiments.design.language import INTERVAL_NAMES, FactorConfig, QuestionConfig, TrialConfig, shown_level
 
 Factors = Mapping[str, FactorConfig]

@@ -21,12 +21,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from device import DeviceError, Gun, open_gun
+from device.interrupts import begin_aside, interrupts_held, wait_awake
 from device.machine_clock import MACHINE_CLOCK, machine_s
 from device.methods import Method
 from device.parameters import GunParameters
 from device.plugin.conformance import ConformanceFinding, OpenedGuns, conformance, rig_at
 from device.plugin.door import IMPORT_S, PLUGIN_OPEN_S
-from device.plugin.guard import GunLeftOpen, PluginError, begin_aside, interrupts_held, wait_awake
+from device.plugin.guard import GunLeftOpen, PluginError
 from device.serial_gun.gun import SCHEME, speed_of
 from device.serial_gun.lines import WrongVersion
 from experiments.catalogues.catalogue import language

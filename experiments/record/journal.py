@@ -20,7 +20,8 @@ from typing import Literal, Self, TypeVar, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from device.words import Identity, RecoilError
+from device.messages import RecoilError
+from device.words import Identity
 from experiments.clock import Clock
 from experiments.config.setup import sha256
 from experiments.design.plan import Plan

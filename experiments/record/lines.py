@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from pydantic import JsonValue
 
-from device.words import RecoilError
+from device.messages import RecoilError
 
 
 class LineError(RecoilError):

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.config.door import ConfigError, StudyConfig
 from experiments.config.findings import CODE
 from experiments.config.setup import Setup

@@ -17,7 +17,7 @@ from typing import Literal
 
 from pydantic import JsonValue, ValidationError
 
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.clock import date_text
 from experiments.config.door import ConfigError, Model, StudyConfig, read_toml
 from experiments.config.setup import Setup, sha256

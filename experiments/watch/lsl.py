@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from device.machine_clock import machine_s
-from device.words import RecoilError, error_line, said_by
+from device.messages import RecoilError, error_line, said_by
 from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.watch.feed import MarkerFeed
 from experiments.watch.markers import DETAIL_COLUMNS, Marker

@@ -8,7 +8,7 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
-from device.words import how_many
+from device.messages import how_many
 from experiments.clock import date_text
 from experiments.session.duration import end_text
 from experiments.watch.folder import Watched

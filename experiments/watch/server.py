@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.study.folders import PlaceError
 from experiments.watch.folder import FolderWatch, Reader, watched_folder
 from experiments.watch.page import PAGE_PARTS, page_parts, static, whole_page

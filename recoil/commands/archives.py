@@ -19,7 +19,7 @@ from analysis.report.terminal import (
     show,
     tracked,
 )
-from device.words import few_of_each
+from device.messages import few_of_each
 
 FreeTextOption = Annotated[
     bool, typer.Option("--free-text", help="With comments and notes; they might say who someone is.")

@@ -22,7 +22,7 @@ from analysis.report.terminal import (
     show,
     tracked,
 )
-from device.words import RecoilError, few_of_each
+from device.messages import RecoilError, few_of_each
 
 
 class ObserverName(StrEnum):

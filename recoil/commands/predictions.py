@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from analysis.report import terminal
-from device.words import few_of_each
+from device.messages import few_of_each
 
 if TYPE_CHECKING:
     from analysis.predict.power.grid import PowerRequest

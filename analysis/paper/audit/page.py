@@ -14,7 +14,7 @@ from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, P
 from analysis.paper.paper import ComparisonRow, ComparisonVerdict, Prediction
 from analysis.report.section import Section, Table
 from analysis.report.serial import beside
-from device.words import how_many
+from device.messages import how_many
 
 _AUDIT_VERDICTS: tuple[AuditVerdict, ...] = get_args(AuditVerdict)
 

@@ -21,7 +21,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BeforeValidator
 
 from analysis.report.serial import beside, written
-from device.words import first_few
+from device.messages import first_few
 
 Relation = Literal["=", "<", "<=", ">", ">="]
 _RELATIONS: dict[str, Relation] = {"": "=", "=": "=", "<": "<", ">": ">", "<=": "<=", ">=": ">=", "≤": "<=", "≥": ">="}

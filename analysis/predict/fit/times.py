@@ -31,7 +31,7 @@ from analysis.times.fit import EDGE, AnsweredBy, DiffusionFit, Estimate, answere
 from analysis.times.likelihood import LapseRange, Trials
 from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.people import FEWEST_TRIALS, MeanEstimate, as_trials, fit_people
-from device.words import how_many
+from device.messages import how_many
 from experiments.config.door import ConfigError, load
 from experiments.record import storage
 from experiments.study.folders import PlaceError

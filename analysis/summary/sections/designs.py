@@ -17,7 +17,7 @@ from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.shown_trades import instruction_sentences
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
-from device.words import how_many
+from device.messages import how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words, joined_by_and
 

@@ -12,7 +12,7 @@ from analysis.report import apa
 from analysis.report.labels import named
 from analysis.summary.results import RulesApplied
 from analysis.summary.sections.content import ReportData
-from device.words import how_many
+from device.messages import how_many
 
 _REASONS = 5
 """So many reasons of exclusion are told."""

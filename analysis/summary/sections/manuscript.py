@@ -14,7 +14,7 @@ from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
 from analysis.summary.sections.designs import result_sentences
 from analysis.summary.sections.exclusion_words import people_left_out, trials_dropped
 from analysis.summary.sections.experiments import effect_sentence, pairs_sentence
-from device.words import how_many
+from device.messages import how_many
 from experiments.study.study import Facts
 
 _HOW = (

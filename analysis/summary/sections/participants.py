@@ -14,7 +14,7 @@ from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table
 from analysis.summary.participation import PeopleOfExperiment
 from analysis.summary.results import DesignSummary, Origin, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
-from device.words import how_many
+from device.messages import how_many
 
 _NAMED = 12
 """So many lines of who was left out stand on top, and so many people in a line; all are in the appendix."""

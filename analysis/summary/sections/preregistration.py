@@ -8,7 +8,7 @@ from analysis.report import apa
 from analysis.report.section import Section, Table
 from analysis.summary.deviations import Deviation, FrozenAs, StudyDeviations
 from analysis.summary.sections.content import ReportData
-from device.words import how_many
+from device.messages import how_many
 from experiments.study.preregistration import plain_value
 
 

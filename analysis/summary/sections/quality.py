@@ -13,7 +13,7 @@ from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.designs import lacking_conditions
 from analysis.summary.summary import UNDEFINED
 from analysis.times.own_trials import ResponseTimes
-from device.words import first_few, how_many
+from device.messages import first_few, how_many
 
 
 def quality_section(report: ReportData) -> Iterator[Section]:

@@ -18,7 +18,7 @@ from analysis.stats.random_intercept import RandomInterceptLogit
 from analysis.summary.requests import Requested, RequestKind
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.supplement import bayes_cell
-from device.words import how_many
+from device.messages import how_many
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

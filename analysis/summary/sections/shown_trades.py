@@ -14,7 +14,8 @@ from analysis.summary.sections.content import condition_words
 from analysis.times.own_trials import INSTRUCTION
 from analysis.times.people import Mean
 from analysis.times.speed_accuracy import SpeedAccuracy
-from device.words import DIRECTIONS, how_many
+from device.messages import how_many
+from device.words import DIRECTIONS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.pictures import functions_figure_of, tracks_figure_of
 from analysis.summary.thresholds import ConditionFit, Thresholds
-from device.words import how_many
+from device.messages import how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words
 

@@ -12,7 +12,7 @@ from analysis.summary.sections.pictures import response_times_picture
 from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
 from analysis.times.people import Mean
 from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
-from device.words import how_many
+from device.messages import how_many
 
 _UNITS = {"drift": "1/√s", "boundary": "√s", "start": "0 to 1", "non_decision_s": "s"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from device.words import how_many
+from device.messages import how_many
 from experiments.design.procedures.config import (
     AdaptiveConfig,
     KestenConfig,

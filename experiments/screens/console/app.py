@@ -14,7 +14,7 @@ from PyQt6.QtCore import QEventLoop, QObject, Qt, pyqtSignal
 from PyQt6.QtWidgets import QApplication
 
 from device import DeviceError, GunStatus
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig

@@ -16,7 +16,7 @@ from PyQt6.QtGui import QGuiApplication
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from device.machine_clock import machine_s
-from device.words import RecoilError
+from device.messages import RecoilError
 from experiments.catalogues.catalogue import Language
 from experiments.clock import RealClock
 from experiments.config.setup import Setup

@@ -27,7 +27,7 @@ from PyQt6 import QtCore
 from PyQt6.QtGui import QKeyEvent
 from PyQt6.QtWidgets import QApplication, QWidget
 
-from device.words import INTERRUPTS
+from device.interrupts import INTERRUPTS
 from experiments.screens.console.keys import EventClock, Name, Presses
 
 DESIGNED_FOR_PX = (1280, 800)

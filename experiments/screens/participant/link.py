@@ -16,8 +16,8 @@ from typing import Self, TypeVar
 
 from pydantic import ValidationError
 
+from device.messages import RecoilError
 from device.own_process import own_program
-from device.words import RecoilError
 from experiments.clock import RealClock
 from experiments.screens.participant import messages
 from experiments.screens.participant.messages import NOISE_S, REPLY_S, line
