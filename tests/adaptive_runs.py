@@ -48,7 +48,7 @@ from experiments.session.steps import (
     step_record,
 )
 from experiments.study.folders import place
-from experiments.synthetic.answers import synthetic_participant_of
+from experiments.synthetic.answers import SyntheticParticipant, synthetic_participant_of
 from experiments.synthetic.laws import SyntheticAnswers
 from experiments.tasks.questions import AnswerValue
 from tests.designs import changed, merged
@@ -110,8 +110,8 @@ def adaptive(kind: str, sets: int = 2, **more: Any) -> Setup[DesignConfig]:
 class UndoingScreen(SyntheticScreen):
     """A synthetic participant whose experimenter corrects and repeats at random, wherever that may be done."""
 
-    def __init__(self, config: Any, observer: Any, clock: Clock, seed: int, share: float) -> None:
-        super().__init__(config, observer, clock)
+    def __init__(self, config: Any, participant: SyntheticParticipant, clock: Clock, seed: int, share: float) -> None:
+        super().__init__(config, participant, clock)
         self._random, self._share = random.Random(seed), share
 
     def act(self, position: Position, until_s: float | None) -> None:

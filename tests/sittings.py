@@ -30,7 +30,7 @@ from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
 from experiments.study.folders import Place, place
-from experiments.synthetic.answers import synthetic_participant_of
+from experiments.synthetic.answers import SyntheticParticipant, synthetic_participant_of
 from tests.designs import direction_with
 
 SETUPS = {
@@ -90,8 +90,10 @@ class TroubledGun:
 class WatchingScreen(SyntheticScreen):
     """A synthetic participant who looks at gun and journal whenever asked or told something."""
 
-    def __init__(self, config: Any, observer: Any, clock: Clock, gun: TroubledGun, journal: Path) -> None:
-        super().__init__(config, observer, clock)
+    def __init__(
+        self, config: Any, participant: SyntheticParticipant, clock: Clock, gun: TroubledGun, journal: Path
+    ) -> None:
+        super().__init__(config, participant, clock)
         self.gun, self._journal = gun, journal
         self.acknowledged = 0
         self.trouble: dict[int, BaseException] = {}
@@ -162,8 +164,8 @@ def sitting(
     heads = {"plan": plan.record(), "plan_sha256": plan.sha256()}
     journal.append("run", **heads, setup=setup.record(), setup_sha256=setup.sha256())
     gun = TroubledGun(setup, clock, troubles or {})
-    observer = synthetic_participant_of(setup, plan)
-    screen = WatchingScreen(setup.config, observer, clock, gun, where.journal)
+    participant = synthetic_participant_of(setup, plan)
+    screen = WatchingScreen(setup.config, participant, clock, gun, where.journal)
     return Sitting(plan, setup, where, gun, screen, clock, journal)
 
 

@@ -1,8 +1,6 @@
-"""The screen of a synthetic participant: answers come from an observer, waiting from the clock it is given."""
+"""The screen of a synthetic participant: answers are the participant's, waiting is the clock's that it is given."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from device import GunStatus
 from experiments.clock import Clock
@@ -17,7 +15,7 @@ from experiments.session.judging import REARM_HELD_S
 from experiments.session.remarks import Remark
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Describe, Outcome, Present, Rate, Rest, Step
-from experiments.synthetic.answers import synthetic_participant_of
+from experiments.synthetic.answers import SyntheticParticipant, synthetic_participant_of
 
 
 def synthetic_screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> SyntheticScreen:
@@ -28,9 +26,9 @@ def synthetic_screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> Sy
 class SyntheticScreen:
     """Works a run as a person would, in as much time as the config plans for it, in the run's own thread."""
 
-    def __init__(self, config: DesignConfig, observer: Any, clock: Clock) -> None:
+    def __init__(self, config: DesignConfig, participant: SyntheticParticipant, clock: Clock) -> None:
         self._config = config
-        self._observer, self._clock = observer, clock
+        self._participant, self._clock = participant, clock
         self._live: LiveRun | None = None
         self._begun: tuple[int, float] = (0, 0.0)
 
@@ -67,7 +65,7 @@ class SyntheticScreen:
                 return events.Rating(rating=self._rating(step), by="synthetic")
             case State.DESCRIBING if isinstance(step, Describe):
                 self._clock.sleep(self._config.question_s)
-                return events.Description(text=self._observer.describe(step.trial, step.question), by="synthetic")
+                return events.Description(text=self._participant.describe(step.trial, step.question), by="synthetic")
             case State.INFORMING:
                 return events.Told()
             case State.RESTING if isinstance(step, Rest):
@@ -81,26 +79,25 @@ class SyntheticScreen:
                 return None
 
     def _answer(self, position: Position, step: Ask) -> Event:
-        """Answer after the observer's own response time."""
-        answer = self._observer.answer(step.trial, step.question, self._chosen(step))
+        """Answer after the participant's own response time."""
+        answer = self._participant.answer(step.trial, step.question, self._chosen(step))
         onset_s = position.onset_s if position.onset_s is not None else self._clock.now()
         self._clock.sleep(onset_s + answer.response_time_s - self._clock.now())
         return events.Answer(response=answer.response, by="synthetic", response_time_s=answer.response_time_s)
 
     def _rating(self, step: Rate) -> float | None:
-        rating: float | None = self._observer.rate(step.trial, step.question, self._chosen(step))
-        return rating
+        return self._participant.rate(step.trial, step.question, self._chosen(step))
 
     def _chosen(self, step: Ask | Rate) -> Condition:
         """The levels that a procedure chose for what was felt."""
         return () if self._live is None else chosen_levels(self._live.history, step.trial)
 
     def _next(self, position: Position, step: Present, until_s: float | None) -> Event | None:
-        """Say next once the observer has felt enough since the first onset; drawn when the stimulus begins."""
+        """Say next once the participant has felt enough since the first onset; drawn when the stimulus begins."""
         if position.onset_s is None or until_s is None:
             return None
         if self._begun[0] != position.number:
-            felt_s = max(self._observer.exposure_s(step.trial), step.least_exposure_s)
+            felt_s = max(self._participant.exposure_s(step.trial), step.least_exposure_s)
             self._begun = (position.number, position.onset_s + felt_s)
         next_at_s = self._begun[1]
         self._clock.sleep(min(next_at_s, until_s) - self._clock.now())

@@ -188,7 +188,7 @@ class Answered:
     """What the participant said, and whose hand entered it. The time is valid if it came from the participant's own.
 
     `key_time_s` is when the key for it went down, since the onset, where the response time is not that of the key: a
-    synthetic participant's is the observer's. Ratings and descriptions have no times.
+    synthetic participant's is drawn. Ratings and descriptions have no times.
     """
 
     value: AnswerValue

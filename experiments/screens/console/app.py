@@ -8,7 +8,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import Any
 
 from PyQt6.QtCore import QEventLoop, QObject, Qt, pyqtSignal
 from PyQt6.QtWidgets import QApplication
@@ -41,7 +40,7 @@ from experiments.session.remarks import Noted, Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import PlaceError
-from experiments.synthetic.answers import synthetic_participant_of
+from experiments.synthetic.answers import SyntheticParticipant, synthetic_participant_of
 from experiments.tasks.questions import first_choices
 
 GUN_LOOK_S = 0.2
@@ -88,7 +87,7 @@ class _Bridge(QObject):
 class Console:
     """One run at the console, and the screen that the run knows: what it is shown becomes messages to the window.
 
-    `participant` is the participant's own screen, where there is one; `observer` the synthetic participant, where one
+    `participant` is the participant's own screen, where there is one; `synthetic` the synthetic participant, where one
     works the console, from when the window is there. `band` says that it is a practice or a training, `last` what
     comes after it. `PlaceError` without a display.
     """
@@ -109,7 +108,7 @@ class Console:
         self._band, self._last = band, last
         self.window: ConsoleWindow | None = None
         self.live: LiveRun | None = None
-        self.observer: Any = None
+        self.synthetic: SyntheticParticipant | None = None
         self._result: Finished | None = None
         self._error: BaseException | None = None
         self._leaving, self._failed = "", False
@@ -166,7 +165,7 @@ class Console:
             choices=first_choices(window.about.setup.config),
             hand=self._hand,
             participant=self.participant,
-            observer=self.observer,
+            synthetic=self.synthetic,
             kept=not window.about.band,
         )
 
@@ -215,7 +214,7 @@ class Console:
 
     def _make_screen(self, setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> Screen:
         del clock
-        self.observer = synthetic_participant_of(setup, plan) if self._hand == "synthetic" else None
+        self.synthetic = synthetic_participant_of(setup, plan) if self._hand == "synthetic" else None
         about = view.About(
             setup=setup,
             plan=plan,

@@ -5,7 +5,7 @@ What a press means depends on what is on the screen: a page over it, a line that
 
 from __future__ import annotations
 
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 from experiments.clock import Clock
 from experiments.design.plan import Trial
@@ -21,6 +21,7 @@ from experiments.session.history import chosen_levels, entered_value
 from experiments.session.judging import NOTHING_TO_REPEAT, NOTHING_TO_UNDO, REARM_HELD_S
 from experiments.session.states import ARMED, EMERGENCY, Position, State
 from experiments.session.steps import Ask, Asking, Rate, what
+from experiments.synthetic.answers import SyntheticParticipant
 from experiments.tasks.questions import AnswerValue, Choice
 
 TextField = Literal["line", "number", "words"]
@@ -78,7 +79,7 @@ _EVENTS: dict[keys.Name, Event] = {
 
 
 class Controls:
-    """The experimenter's hands on a live run. `observer` is the synthetic participant, where it answers.
+    """The experimenter's hands on a live run. `synthetic` is the synthetic participant, where it answers.
 
     `choices` are the answers whose keys are known before any is asked for: what comes too soon is told so.
 
@@ -94,12 +95,12 @@ class Controls:
         choices: tuple[Choice, ...] = (),
         hand: Hand = "experimenter",
         participant: ParticipantSide | None = None,
-        observer: Any = None,
+        synthetic: SyntheticParticipant | None = None,
         kept: bool = True,
     ) -> None:
         self._live, self._clock, self._view = live, clock, view
         self._choices, self._hand, self._participant = choices, hand, participant
-        self._observer, self._kept = observer, kept
+        self._synthetic, self._kept = synthetic, kept
         self._open: tuple[keys.Name, Trial] | None = None
         self._held: Press | None = None
         self.drawn = live.position
@@ -297,11 +298,11 @@ class Controls:
     def _drawn_s(self, response: str) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""
         step = self.drawn.step
-        if self._observer is None or not isinstance(step, Ask):
+        if self._synthetic is None or not isinstance(step, Ask):
             return None
         chosen = chosen_levels(self._live.history, step.trial)
-        answer = self._observer.answer(step.trial, step.question, chosen)
-        return float(answer.response_time_s) if answer.response == response else None
+        answer = self._synthetic.answer(step.trial, step.question, chosen)
+        return answer.response_time_s if answer.response == response else None
 
     def _entered(self, press: Press) -> None:
         """Enter: the line, the field, or the end of the run."""

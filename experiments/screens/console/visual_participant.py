@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from PyQt6.QtCore import Qt, QTimer
 from PyQt6.QtGui import QWindow
@@ -19,6 +19,7 @@ from experiments.session.history import chosen_levels
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Rate
 from experiments.study.folders import PlaceError
+from experiments.synthetic.answers import SyntheticParticipant
 from experiments.tasks.questions import on_scale
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class VisualParticipant:
         asking = self._console.participant.asking  # only then: what comes later would be done to the next question
         match window.drawn.state:
             case State.RATING if isinstance(step, Rate):
-                rating = self._observer.rate(step.trial, step.question, _chosen(window, step))
+                rating = self._synthetic.rate(step.trial, step.question, _chosen(window, step))
                 if rating is not None and asking:
                     self._rater.rate(step, rating)
                 return rating is not None
@@ -84,9 +85,11 @@ class VisualParticipant:
                 return False
 
     @property
-    def _observer(self) -> Any:
-        """The observer, which is there once the window is."""
-        return self._console.observer
+    def _synthetic(self) -> SyntheticParticipant:
+        """The synthetic participant, who is there once the window is."""
+        if self._console.synthetic is None:
+            raise TypeError("nobody is there to answer")
+        return self._console.synthetic
 
     def _thinks(self, window: ConsoleWindow, position: Position, now_s: float) -> bool:
         """Whether the response time is not over yet."""
@@ -94,9 +97,8 @@ class VisualParticipant:
         if position.state is not State.ASKING or not isinstance(step, Ask):
             return False
         onset_s = position.since_s if position.onset_s is None else position.onset_s
-        return bool(
-            now_s < onset_s + self._observer.answer(step.trial, step.question, _chosen(window, step)).response_time_s
-        )
+        answer = self._synthetic.answer(step.trial, step.question, _chosen(window, step))
+        return now_s < onset_s + answer.response_time_s
 
     def _press(self, window: ConsoleWindow, position: Position) -> None:
         step, handle = position.step, window.windowHandle()
@@ -108,14 +110,14 @@ class VisualParticipant:
             case State.PREPARING | State.TRAIN:
                 _key(handle, Qt.Key.Key_Space)
             case State.ASKING if isinstance(step, Ask):
-                said = self._observer.answer(step.trial, step.question, _chosen(window, step)).response
+                said = self._synthetic.answer(step.trial, step.question, _chosen(window, step)).response
                 QTest.keyClick(handle, next(one.key for one in step.choices if one.answer == said))  # type: ignore[call-overload] # as below
             case State.RESTING:
                 _key(handle, Qt.Key.Key_E)
                 _type(BREAK_REASON, handle)
             case State.RATING if isinstance(step, Rate):
                 self._rate(
-                    self._observer.rate(step.trial, step.question, _chosen(window, step)),
+                    self._synthetic.rate(step.trial, step.question, _chosen(window, step)),
                     window,
                     handle,
                 )
