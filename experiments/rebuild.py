@@ -1,17 +1,20 @@
-"""The table that a journal makes, by the design in its first line."""
+"""The table that a journal makes, by the design in its first line, and how it is made again where one stands."""
 
 from __future__ import annotations
 
 import csv
 import io
+import os
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from device.messages import how_many
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
-from experiments.record import design_columns, design_table, replay
+from experiments.record import design_columns, design_table, replay, storage
 from experiments.record.journal import ENDING, Contents, Head, JournalError, read_journal
 from experiments.record.shots_table import SHOTS, shot_rows
 from experiments.record.tables import table_bytes
@@ -97,3 +100,62 @@ def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
         raise JournalError(f"{path}: {said}")
     name = path.name.replace("_journal", f"_{began_with(contents.head).table}")
     return path.with_name(name).with_suffix(".csv"), table(contents), contents
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RebuiltTable:
+    """A table made again: whether it had to be written, and what there is to say."""
+
+    table: Path
+    rebuilt: bool
+    messages: tuple[str, ...]
+
+
+def _holds(path: Path, data: bytes) -> bool:
+    """Whether there is a plain file with this content; of a device or a pipe nothing is read."""
+    try:
+        return storage.read(path, len(data) + 1) == data
+    except OSError:
+        return False
+
+
+def _kept(table: Path, data: bytes, messages: list[str]) -> bool:
+    """Whether a table has this content already; else it has now, and what stood there is set aside with a message."""
+    if _holds(table, data):
+        return True
+    if os.path.lexists(table):
+        beyond = _rows_beyond(table, data)
+        aside = storage.set_aside_file(table)
+        messages.append(f"{table}: differed from its journal and was set aside as {aside}{_lost(beyond)}")
+    storage.write_whole(table, data)
+    return False
+
+
+def _rows_beyond(table: Path, data: bytes) -> int:
+    """How many rows a table that stands there holds more of; 0 of what is no table of about that size."""
+    try:
+        return rows_beyond(storage.read(table, 10 * len(data)), data)
+    except OSError:
+        return 0
+
+
+def _lost(rows: int) -> str:
+    """What is said where the table that was set aside holds more than the one that took its place."""
+    if not rows:
+        return ""
+    said = f"it holds more than the journal in {how_many(rows, 'row')}, which the table made now lacks"
+    return f"; {said}: if the journal is cut short, put it back whole, and the table that was set aside in its place"
+
+
+def rebuild_table(path: Path) -> RebuiltTable:
+    """The table of a journal, and that of what a sensor measured.
+
+    One that differs from its journal is set aside, not overwritten.
+    """
+    table, data, contents = rebuild(path)
+    messages = [contents.cut_message] if contents.cut_message else []
+    kept = _kept(table, data, messages)
+    measured = shots_table(contents)
+    if measured is not None:
+        _kept(path.with_name(path.name.replace("_journal", "_shots")).with_suffix(".csv"), measured, messages)
+    return RebuiltTable(table=table, rebuilt=not kept, messages=tuple(messages))

@@ -1,8 +1,7 @@
-"""`recoil run` and `recoil rebuild`: which screen and clock a run gets, and tables made again."""
+"""`recoil run`: which screen and clock a run gets, and what is said of it."""
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator
@@ -11,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.report.terminal import say
-from device.messages import few_of_each, how_many, said_by
+from device.messages import few_of_each, said_by
 from device.serial_gun.gun import speed_of
 from experiments.catalogues.catalogue import ENGLISH, Language, check_allowed, language, languages
 from experiments.clock import Clock, RealClock, VirtualClock
@@ -23,8 +22,7 @@ from experiments.design.shown_texts import letters_of
 from experiments.earlier_run import begun_language, language_begun_in
 from experiments.live_run import RunStopped, Screen
 from experiments.load import language_key
-from experiments.rebuild import rebuild, rows_beyond, shots_table
-from experiments.record import replay, storage
+from experiments.record import replay
 from experiments.record.journal import begun
 from experiments.run import Finished, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
@@ -285,62 +283,3 @@ def again(*, resume: bool, fresh: bool, reason: str) -> Again:
     if reason and not fresh:
         raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
     return "resume" if resume else "fresh" if fresh else "ask"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RebuiltTable:
-    """A table made again: whether it had to be written, and what there is to say."""
-
-    table: Path
-    rebuilt: bool
-    messages: tuple[str, ...]
-
-
-def _holds(path: Path, data: bytes) -> bool:
-    """Whether there is a plain file with this content; of a device or a pipe nothing is read."""
-    try:
-        return storage.read(path, len(data) + 1) == data
-    except OSError:
-        return False
-
-
-def _kept(table: Path, data: bytes, messages: list[str]) -> bool:
-    """Whether a table has this content already; else it has now, and what stood there is set aside with a message."""
-    if _holds(table, data):
-        return True
-    if os.path.lexists(table):
-        beyond = _rows_beyond(table, data)
-        aside = storage.set_aside_file(table)
-        messages.append(f"{table}: differed from its journal and was set aside as {aside}{_lost(beyond)}")
-    storage.write_whole(table, data)
-    return False
-
-
-def _rows_beyond(table: Path, data: bytes) -> int:
-    """How many rows a table that stands there holds more of; 0 of what is no table of about that size."""
-    try:
-        return rows_beyond(storage.read(table, 10 * len(data)), data)
-    except OSError:
-        return 0
-
-
-def _lost(rows: int) -> str:
-    """What is said where the table that was set aside holds more than the one that took its place."""
-    if not rows:
-        return ""
-    said = f"it holds more than the journal in {how_many(rows, 'row')}, which the table made now lacks"
-    return f"; {said}: if the journal is cut short, put it back whole, and the table that was set aside in its place"
-
-
-def rebuild_table(path: Path) -> RebuiltTable:
-    """The table of a journal, and that of what a sensor measured.
-
-    One that differs from its journal is set aside, not overwritten.
-    """
-    table, data, contents = rebuild(path)
-    messages = [contents.cut_message] if contents.cut_message else []
-    kept = _kept(table, data, messages)
-    measured = shots_table(contents)
-    if measured is not None:
-        _kept(path.with_name(path.name.replace("_journal", "_shots")).with_suffix(".csv"), measured, messages)
-    return RebuiltTable(table=table, rebuilt=not kept, messages=tuple(messages))

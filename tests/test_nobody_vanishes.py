@@ -20,13 +20,13 @@ from analysis.summary.participation import PersonInExperiment, exclusion_lines
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
+from experiments.rebuild import rebuild_table
 from experiments.record.tables import DataKind
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.folders import place, set_aside
-from recoil.session import rebuild_table
 from tests.conftest import Recoil, refused
 from tests.lies import journal, lines, table
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
