@@ -21,7 +21,7 @@ from device.parameters import GunParameters, VibrationParameters
 from docs import statistics_schema
 from experiments.record.dictionary import dictionary
 from recoil.cli import app
-from recoil.config_files import schemas
+from recoil.schemas import schemas
 
 HERE = Path(__file__).parent / "reference"
 OUT = HERE / "generated"

@@ -23,7 +23,7 @@ from experiments.load import load_setup
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
-from recoil.config_files import new_study
+from experiments.study.new_study import new_study
 from tests import figure_files, warm_start, watched_start
 from tests.at_display import AtConsole, AtDisplay, virtual_display
 from tests.pseudo_languages import LONG, RIGHT_TO_LEFT, write_pseudo_languages

@@ -15,8 +15,8 @@ from experiments.record.journal import link_of, record_line
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.new_study import new_study
 from experiments.study.register import append, entry
-from recoil.config_files import new_study
 from tests.at_runs import shorten
 from tests.journals import raw
 

@@ -11,8 +11,8 @@ from experiments.config.door import checked_table
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, shipped_folder
+from experiments.study.new_study import designs
 from experiments.synthetic.laws import SyntheticAnswers
-from recoil.config_files import designs
 
 Tables = Mapping[str, Any]
 

@@ -18,8 +18,8 @@ from experiments.record.journal import JournalError, read_journal
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.files_begun_with import copy_began_with
 from experiments.study.folders import PlaceError
-from recoil.config_files import copy_began_with
 from tests.conftest import Recoil
 
 pytestmark = pytest.mark.slow

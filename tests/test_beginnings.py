@@ -171,7 +171,7 @@ def test_only_a_change_of_what_is_asked_is_news() -> None:
 
 @pytest.fixture
 def study(tmp_path: Path) -> StudyFolder:
-    from recoil.config_files import new_study
+    from experiments.study.new_study import new_study
 
     new_study(tmp_path / "pilot")
     return open_study(tmp_path / "pilot")

@@ -21,7 +21,7 @@ from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError, open_study, overview
-from recoil.config_files import new_study
+from experiments.study.new_study import new_study
 from tests.conftest import Recoil, refused
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows
 

@@ -24,9 +24,9 @@ from experiments.session.design_session import design_session
 from experiments.session.practice_rounds import RoundScore, is_needed, scores
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import Answered, Ask, FireShot, Inform, Prepare, Rate, Rest, step_after
+from experiments.study.files_begun_with import copy_began_with
 from experiments.study.folders import open_study, overview, place
 from experiments.tasks.questions import right_answer
-from recoil.config_files import copy_began_with
 from tests.designs import SHIPPED, changed, laws_of
 from tests.driven_designs import done
 

@@ -24,8 +24,8 @@ from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.folders import PlaceError
+from experiments.study.new_study import new_study
 from experiments.study.register import append, entry
-from recoil.config_files import new_study
 from tests.bids_validator import validated
 from tests.conftest import RECOIL, Recoil, refused
 from tests.log_files import rating_rows, ratings_path, tree, trial_rows, trials_path, write_rows, write_study

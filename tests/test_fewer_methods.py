@@ -11,7 +11,7 @@ from analysis.predict.check import check
 from analysis.predict.reproduction.reproduce import reproduce
 from analysis.predict.reproduction.study import prepared
 from analysis.summary.analyze import Request, analyze
-from recoil.config_files import new_study
+from experiments.study.new_study import new_study
 
 pytestmark = pytest.mark.slow
 

@@ -54,7 +54,7 @@ from experiments.screens.terminal import TerminalScreen
 from experiments.session.states import Position, State
 from experiments.session.steps import Rate
 from experiments.study.folders import PlaceError
-from recoil.config_files import designs
+from experiments.study.new_study import designs
 from recoil.session import LanguageOptions, run_session
 from tests.pseudo_languages import HEADS, LONG, RIGHT_TO_LEFT, SAID, compiled, write_catalogue, write_pseudo_languages
 

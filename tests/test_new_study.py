@@ -10,7 +10,8 @@ from jsonschema import Draft202012Validator
 
 from experiments.config.door import ConfigError, EligibilityConfig
 from experiments.load import load_setup, load_study, shipped_folder
-from recoil.config_files import designs, new_study, schemas, shipped
+from experiments.study.new_study import designs, new_study, shipped
+from recoil.schemas import schemas
 
 
 @pytest.mark.slow

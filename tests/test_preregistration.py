@@ -34,9 +34,9 @@ from experiments.screens.console.people import changed_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.folders import PlaceError, freeze_status, open_study, overview
+from experiments.study.new_study import new_study
 from experiments.study.preregistration import PreregistrationError, plain_value, run_warnings
 from experiments.study.study import Facts
-from recoil.config_files import new_study
 from tests.conftest import Recoil, refused
 from tests.designs import changed
 from tests.log_files import rating_rows, ratings_path, write_rows

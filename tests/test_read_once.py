@@ -21,7 +21,7 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
 from experiments.study.enrolment import exclude
 from experiments.study.folders import StudyFolder, look_at, open_study, overview
-from recoil.config_files import new_study
+from experiments.study.new_study import new_study
 from tests.traced_trial import MOST, traced
 
 pytestmark = pytest.mark.slow

@@ -17,8 +17,8 @@ from experiments.load import load_setup
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from experiments.study.new_study import new_study
 from experiments.study.register import read_register
-from recoil.config_files import new_study
 from tests import watched_start
 from tests.at_display import HAND_S, AtDisplay, last_record, needs_display, window_manager, x_server
 from tests.watched_start import wait_for

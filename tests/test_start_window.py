@@ -35,9 +35,9 @@ from experiments.screens.console.start import StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
 from experiments.study.folders import StudyFolder, open_study, place
+from experiments.study.new_study import new_study
 from experiments.study.register import read_register
 from experiments.study.study import Facts
-from recoil.config_files import new_study
 
 pytestmark = pytest.mark.slow
 

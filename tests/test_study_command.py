@@ -18,8 +18,8 @@ from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study.enrolment import not_on_record
+from experiments.study.new_study import new_study
 from experiments.study.register import append, entry
-from recoil.config_files import new_study
 from tests.at_terminal import AtTerminal
 from tests.conftest import Recoil, refused
 from tests.waiting import PATIENCE_S

@@ -229,7 +229,9 @@ def configs(
     as_json: AsJsonOption = False,
 ) -> None:
     """List the shipped configs, copy them to edit, give back those that a run began with, or write their schemas."""
-    from recoil.config_files import copy_began_with, copy_configs, shipped, write_schemas
+    from experiments.study.files_begun_with import copy_began_with
+    from experiments.study.new_study import copy_configs, shipped
+    from recoil.schemas import write_schemas
 
     if schema is not None:
         if copy is not None or journal is not None:
@@ -255,6 +257,6 @@ def new(
     as_json: AsJsonOption = False,
 ) -> None:
     """Make a study's folder from a template, or from a shipped design."""
-    from recoil.config_files import new_study
+    from experiments.study.new_study import new_study
 
     _list_files(new_study(study, design, paper=paper), as_json)
