@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.stats.discrimination import CHANCE, discrimination, share_right
+from analysis.stats.discrimination import CHANCE, SHARE_RIGHT, discrimination
 
 TASKS = list(CHANCE)
 N = 400_000
@@ -32,13 +32,13 @@ def simulated(task, d):
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("d", [0.0, 0.5, 1.0, 2.0, 3.5])
 def test_it_is_what_people_of_that_strategy_get_right(task, d):
-    p = float(share_right(d, task))
+    p = float(SHARE_RIGHT[task](np.asarray(d)))
     assert p == pytest.approx(simulated(task, d), abs=5 * np.sqrt(p * (1 - p) / N) + 1e-9)
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_it_begins_at_chance_and_ends_at_certainty(task):
-    p = np.asarray(share_right(np.linspace(0, 20, 400), task))
+    p = SHARE_RIGHT[task](np.linspace(0, 20, 400))
     assert p[0] == pytest.approx(CHANCE[task], abs=1e-12)
     assert p[-1] == pytest.approx(1.0, abs=1e-12)
     assert np.all(np.diff(p) >= -1e-15)
@@ -50,7 +50,7 @@ def test_the_share_of_its_d_prime_is_the_one_it_came_from(task, trials, data):
     right = data.draw(st.integers(0, trials))
     found = discrimination(right, trials, task)
     share = (right + 0.5) / (trials + 1) if found.corrected else right / trials
-    assert float(share_right(found.d_prime, task)) == pytest.approx(max(share, CHANCE[task]), abs=1e-9)
+    assert float(SHARE_RIGHT[task](np.asarray(found.d_prime))) == pytest.approx(max(share, CHANCE[task]), abs=1e-9)
     assert found.corrected == (right in (0, trials))
     assert np.isnan(found.se) == (share <= CHANCE[task])
 

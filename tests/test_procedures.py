@@ -12,6 +12,7 @@ from scipy.stats import norm
 from experiments.design.language import Shape
 from experiments.design.procedures import posterior, psychometric
 from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, UpDown, track_after, track_of
+from tests.threshold_bound import width_of
 
 WIDE = LevelRange(low=-1e6, high=1e6)
 SHAPES: tuple[Shape, ...] = ("normal", "logistic", "gumbel", "reversed-gumbel")
@@ -33,7 +34,7 @@ def test_a_function_is_a_half_at_its_threshold_and_its_tails_are_a_width_apart(s
 
 def test_a_cumulative_normal_is_that_of_scipy() -> None:
     levels = np.linspace(-3, 3, 13)
-    assert psychometric.share_felt(levels, 0.5, psychometric.width_of(0.7)) == pytest.approx(norm.cdf(levels, 0.5, 0.7))
+    assert psychometric.share_felt(levels, 0.5, width_of(0.7)) == pytest.approx(norm.cdf(levels, 0.5, 0.7))
 
 
 # up and down

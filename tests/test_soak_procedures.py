@@ -24,11 +24,11 @@ from experiments.design.procedures.posterior import (
     posterior_after,
     variance_rule,
 )
-from experiments.design.procedures.psychometric import share_felt, width_of
+from experiments.design.procedures.psychometric import share_felt
 from experiments.design.procedures.surface import SurfaceGrid, surface_grid
 from experiments.design.procedures.up_down import Kesten, LevelRange, TrackEnd, TrackState, UpDown, track_of
 from tests.conftest import Soak
-from tests.threshold_bound import threshold_bound
+from tests.threshold_bound import threshold_bound, width_of
 
 pytestmark = pytest.mark.soak
 

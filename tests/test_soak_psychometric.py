@@ -17,8 +17,9 @@ import pytest
 from analysis import paired_scores, psychometric_fit
 from analysis.psychometric.priors import PlateauPrior, default_priors
 from analysis.stats.binomial import binomial_test
-from experiments.design.procedures.psychometric import share_felt, width_of
+from experiments.design.procedures.psychometric import share_felt
 from tests.conftest import Soak
+from tests.threshold_bound import width_of
 
 pytestmark = pytest.mark.soak
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.stats import norm
 
-from experiments.design.procedures.psychometric import width_of
-from tests.threshold_bound import threshold_bound
+from tests.threshold_bound import threshold_bound, width_of
 
 RATES = [(0.5, 0.0), (0.5, 0.02), (1 / 3, 0.1), (0.02, 0.02), (0.0, 0.0), (0.0, 0.1)]
 

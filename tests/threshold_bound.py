@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from math import pi, sqrt
+from statistics import NormalDist
 
-from experiments.design.procedures.psychometric import width_of
+from experiments.design.procedures.psychometric import TAIL
+
+
+def width_of(sd: float) -> float:
+    """The width of a cumulative normal with a standard deviation."""
+    return 2 * NormalDist().inv_cdf(1 - TAIL) * sd
 
 
 def threshold_bound(trials: int, *, width: float, guess: float, lapse: float) -> float:

@@ -21,9 +21,8 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, one_of, whole
+from analysis.stats.arrays import FloatArray, Values, one_of, whole
 from analysis.stats.frames import Result
 
 Task = Literal["two-interval", "abx", "oddity"]
@@ -56,28 +55,12 @@ def _half_normal() -> tuple[FloatArray, FloatArray]:
     return z, 4.5 * weights * np.exp(-(z**2) / 2.0) / np.sqrt(2.0 * np.pi)
 
 
-_RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {
+SHARE_RIGHT: Mapping[Task, Callable[[FloatArray], FloatArray]] = {
     "two-interval": _two_interval,
     "abx": _abx,
     "oddity": _oddity,
 }
-
-
-def _right(task: Task) -> Callable[[FloatArray], FloatArray]:
-    one_of(task, "task", tuple(_RIGHT))
-    return _RIGHT[task]
-
-
-def share_right(d_prime: ArrayLike, task: Task) -> Values:
-    """The share of right answers at a d′ of at least 0. `ValueError`: below 0 or no number.
-
-    >>> round(float(share_right(1.0, "two-interval")), 4), round(float(share_right(0.0, "oddity")), 4)
-    (0.7602, 0.3333)
-    """
-    right, d = _right(task), numbers(d_prime, "d_prime")
-    if np.any(d < 0):
-        raise ValueError("d_prime must be at least 0")
-    return float_or_array(right(d))
+"""The share of right answers at a d′ of at least 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +85,8 @@ def discrimination(right: int, trials: int, task: Task) -> Discrimination:
 
     trials = whole(trials, "trials", 1)
     right = whole(right, "right", 0, trials)
-    share_of, corrected = _right(task), right in (0, trials)
+    one_of(task, "task", tuple(SHARE_RIGHT))
+    share_of, corrected = SHARE_RIGHT[task], right in (0, trials)
     share = (right + 0.5) / (trials + 1) if corrected else right / trials
     if share <= CHANCE[task]:
         return Discrimination(d_prime=0.0, se=float("nan"), corrected=corrected)

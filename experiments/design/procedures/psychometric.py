@@ -46,8 +46,3 @@ def share_felt(x: ArrayLike, threshold: ArrayLike, width: ArrayLike, shape: Shap
             return np.asarray(-np.expm1(-np.exp(np.minimum(_GUMBEL * z + _HALF, 700.0))))
         case "reversed-gumbel":
             return np.asarray(np.exp(-np.exp(np.minimum(-_GUMBEL * z + _HALF, 700.0))))
-
-
-def width_of(sd: float) -> float:
-    """The width of a cumulative normal with a standard deviation."""
-    return _NORMAL * sd

@@ -256,7 +256,7 @@ class Console:
 
     def show(self, position: Position) -> None:
         """Have a position shown, on the participant's screen as well."""
-        self._tell(view.Shown(position=position))
+        self._tell(view.Shown())
         if self.participant is not None:
             self.participant.follow(position)
 

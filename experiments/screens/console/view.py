@@ -39,9 +39,7 @@ class Began(Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown(Message):
-    """A position is to be shown."""
-
-    position: Position
+    """There is a new position to be shown: the window takes it from the run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
