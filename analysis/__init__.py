@@ -31,18 +31,11 @@ if TYPE_CHECKING:
     )
     from analysis.stats.anova_bayes import one_way_bayes_factor, rm_anova_bayes_factor
     from analysis.stats.anova_power import cohens_f, one_way_anova_power, rm_anova_power
-    from analysis.stats.binomial import (
-        BinomialTest,
-        Detection,
-        binomial_test,
-        binomial_test_log_p,
-        binomial_test_p,
-        yes_no,
-    )
+    from analysis.stats.binomial import BinomialTest, binomial_test, binomial_test_log_p, binomial_test_p
     from analysis.stats.contrasts import planned_contrasts
     from analysis.stats.corrections import benjamini_hochberg, holm
     from analysis.stats.diagnostics import cousineau_morey, effect_size, normality, outliers, sphericity
-    from analysis.stats.discrimination import discrimination
+    from analysis.stats.discrimination import Detection, discrimination, yes_no
     from analysis.stats.equivalence import tost_one_sample, tost_paired, tost_two_samples
     from analysis.stats.factorial import factorial_anova
     from analysis.stats.fixed_effects import indicators
@@ -57,11 +50,11 @@ _NAMES = {
     "anova": "Anova Comparison RepeatedMeasuresAnova one_way_anova rm_anova rm_tukey_hsd rm_tukey_hsd_paired tukey_hsd",
     "anova_bayes": "one_way_bayes_factor rm_anova_bayes_factor",
     "anova_power": "cohens_f one_way_anova_power rm_anova_power",
-    "binomial": "BinomialTest Detection binomial_test binomial_test_log_p binomial_test_p yes_no",
+    "binomial": "BinomialTest binomial_test binomial_test_log_p binomial_test_p",
     "contrasts": "planned_contrasts",
     "corrections": "benjamini_hochberg holm",
     "diagnostics": "cousineau_morey effect_size normality outliers sphericity",
-    "discrimination": "discrimination",
+    "discrimination": "Detection discrimination yes_no",
     "equivalence": "tost_one_sample tost_paired tost_two_samples",
     "factorial": "factorial_anova",
     "fixed_effects": "indicators",

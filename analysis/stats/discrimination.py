@@ -1,6 +1,7 @@
-"""d′ from the share of right answers in tasks of several intervals: two-interval, ABX, oddity.
+"""d′: of yes/no judgements, and from the share of right answers in two-interval, ABX and oddity tasks.
 
-All take Gaussian evidence of equal variance, an observer without bias, and the strategy that is named.
+All take Gaussian evidence of equal variance; those of several intervals an observer without bias, and the strategy that
+is named.
 
 ======================  ==============================================================================================
 `two-interval`          p = F(d / sqrt 2): the larger of two
@@ -21,8 +22,9 @@ from typing import Literal
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
-from analysis.stats.arrays import FloatArray, Values, one_of, whole
+from analysis.stats.arrays import FloatArray, Values, float_or_array, numbers, one_of, together, whole
 from analysis.stats.frames import Result
 
 Task = Literal["two-interval", "abx", "oddity"]
@@ -96,3 +98,57 @@ def discrimination(right: int, trials: int, task: Task) -> Discrimination:
     slope = float(np.diff(share_of(np.array([low, high])))[0]) / (high - low)
     se = float(np.sqrt(share * (1.0 - share) / trials) / slope) if slope > 0 else float("nan")
     return Discrimination(d_prime=d, se=se, corrected=corrected)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection(Result):
+    """d' and criterion with the corrected rates they come from. A criterion below 0 leans towards "yes".
+
+    >>> yes_no([18, 12], 20, [6, 6], 20).to_frame().columns.tolist()
+    ['d_prime', 'criterion', 'hit_rate', 'false_alarm_rate']
+    """
+
+    d_prime: Values
+    criterion: Values
+    hit_rate: Values
+    false_alarm_rate: Values
+
+
+def yes_no(hits: ArrayLike, signal_trials: ArrayLike, false_alarms: ArrayLike, noise_trials: ArrayLike) -> Detection:
+    """Sensitivity d' = z(H) - z(F) and criterion c = -(z(H) + z(F)) / 2 of a yes/no judgement, log-linear corrected.
+
+    H = (hits + 0.5) / (signal_trials + 1), F = (false_alarms + 0.5) / (noise_trials + 1), always, not only at 0 and 1.
+    For judgements of direction "yes" is "forward": said on a forward shot a hit, on a backward shot a false alarm.
+    All arguments broadcast. `ValueError`: a count that is not whole or outside 0..its trials, or no trials.
+    Sources: Hautus 1995, Behavior Research Methods 27, 46; Macmillan & Creelman 2005, chapter 2.
+
+    >>> round(yes_no(10, 10, 0, 10).d_prime, 3)
+    3.381
+    """
+    hits, signal_trials, false_alarms, noise_trials = together(
+        hits=numbers(hits, "hits"),
+        signal_trials=numbers(signal_trials, "signal_trials"),
+        false_alarms=numbers(false_alarms, "false_alarms"),
+        noise_trials=numbers(noise_trials, "noise_trials"),
+    )
+    hit_rate, z_hit = _rate_and_z(hits, signal_trials, "hits", "signal_trials")
+    false_alarm_rate, z_false_alarm = _rate_and_z(false_alarms, noise_trials, "false_alarms", "noise_trials")
+    return Detection(
+        d_prime=float_or_array(z_hit - z_false_alarm),
+        criterion=float_or_array(-(z_hit + z_false_alarm) / 2.0),
+        hit_rate=float_or_array(hit_rate),
+        false_alarm_rate=float_or_array(false_alarm_rate),
+    )
+
+
+def _rate_and_z(counts: FloatArray, totals: FloatArray, name: str, of: str) -> tuple[FloatArray, FloatArray]:
+    """The corrected rate and its normal quantile, taken from the nearer end so that 0 and all mirror exactly."""
+    if (totals < 1.0).any():
+        raise ValueError(f"{of} must be at least 1, not {totals[totals < 1.0][0]:g}")
+    if ((counts < 0.0) | (counts > totals)).any():
+        raise ValueError(f"{name} must lie in 0..{of}, not {counts[(counts < 0.0) | (counts > totals)][0]:g}")
+    if (counts != np.floor(counts)).any() or (totals != np.floor(totals)).any():
+        raise ValueError(f"{name} and {of} must be whole numbers, counts and not rates")
+    rest = totals - counts
+    z = scipy.special.ndtri((np.minimum(counts, rest) + 0.5) / (totals + 1.0))
+    return (counts + 0.5) / (totals + 1.0), np.where(counts > rest, -z, z)

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 import scipy
 
-from analysis.stats.binomial import yes_no
-from analysis.stats.discrimination import Task, discrimination
+from analysis.stats.discrimination import Task, discrimination, yes_no
 from analysis.summary.question_results import DesignTest
 from experiments.design.language import QuestionConfig, TrialConfig
 

@@ -23,7 +23,7 @@ from analysis.report.serial import undefined
 from analysis.report.terminal import Tell, untold
 from analysis.stats.anova import Comparison, rm_anova, rm_tukey_hsd, rm_tukey_hsd_paired
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import binomial_test, yes_no
+from analysis.stats.binomial import binomial_test
 from analysis.stats.cells import ByParticipant, TrialCells, coded, trial_cells
 from analysis.stats.diagnostics import (
     EFFECT_SIZE_NOTE,
@@ -36,6 +36,7 @@ from analysis.stats.diagnostics import (
     outliers,
     sphericity,
 )
+from analysis.stats.discrimination import yes_no
 from analysis.stats.logit_model import METHOD as CLUSTERING_NOTE
 from analysis.stats.logit_model import MODEL_NAME, MODEL_NOTE, LogitModel, clustering, logit_model
 from analysis.stats.paired import (

@@ -33,7 +33,7 @@ from analysis.report.figures.style import (
     width_for,
 )
 from analysis.stats.arrays import FloatArray
-from analysis.stats.binomial import yes_no
+from analysis.stats.discrimination import yes_no
 from analysis.summary.results import DirectionStatistics, Pair, Scores, StudyStatistics, WithinStatistics
 
 
