@@ -223,10 +223,17 @@ def test_a_prefix_that_makes_no_code_is_refused(prefix: str) -> None:
         ("[questions.felt]\n[questions.felt]", "the table [questions.felt] stands there twice; put all of it into one"),
         ("a = 1\na = 2\n", "some.toml:2: not TOML: a key or table of that name stands there already"),
         ("a = 1\r\nb = no\r\n", "some.toml:2: not TOML: Invalid value (column 5); write true or false"),
+        ("a" + ".a" * 50_000 + " = 1", "some.toml:1: a key has too many parts"),
+        ('x = 1\n["a"' + '."a"' * 50_000 + "]", "some.toml:2: a key has too many parts"),
+        ("x = " + "[" * 5_000, "too deep in each other"),
+        ("x = " + "[" * 100 + "]" * 100, "too deep in each other"),
+        ("x = " + "{a = " * 50 + "1" + "}" * 50, "too deep in each other"),
+        ("#" * 1_000_001, "rule: at most 1000000"),
+        ("a = " + "9" * 5_000, "not TOML"),
         ("a = [1", "some.toml: not TOML: Unclosed array (at end of document)"),
     ],
 )
-def test_what_is_no_toml_is_told_with_its_line_and_what_to_write_instead(text: str, said: str) -> None:
+def test_what_is_no_toml_or_beyond_reason_is_told_with_its_line_and_what_to_write_instead(text: str, said: str) -> None:
     with pytest.raises(ConfigError) as refused:
         tables(text, "some.toml")
     assert said in str(refused.value)

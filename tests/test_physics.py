@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from device.physics import GunParameters, simulate, trace
-from tests.extreme_guns import EXTREMES, guns_about
+from tests.extreme_guns import EXTREMES, guns_about, numbers
 
 # 50-digit Taylor integration of equations (1) to (3) with the coil open after the pulse, by another program; in SI.
 TAYLOR_OPEN = {
@@ -40,10 +40,6 @@ TAYLOR_SHORTED = {
     (1.12, "reciprocal"): (0.2166, 0.17460),
 }
 VARIANTS = [(f, off, emf) for f in (0.21, 1.12) for off in ("shorted", "open") for emf in ("printed", "reciprocal")]
-
-
-def numbers(summary):
-    return {k: v for k, v in dataclasses.asdict(summary).items() if k != "status" and v is not None}
 
 
 @pytest.mark.parametrize("friction_N", [0.21, 1.12])
