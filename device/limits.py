@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from itertools import chain, dropwhile
 
 from device import words
-from device.values import is_finite, is_whole_number, shown
 
 MAX_DUTY = 0.10
 """Of any second: the paper's drive, 10 ms in 100 ms."""
@@ -45,8 +44,8 @@ class Load:
 
     def __post_init__(self) -> None:
         for name, value in (("on_s", self.on_s), ("heat_J", self.heat_J)):
-            if not (is_finite(value) and value >= 0):
-                raise words.LimitError(f"{name} is {shown(value)}; it must be a finite number of at least 0")
+            if not (words.is_finite(value) and value >= 0):
+                raise words.LimitError(f"{name} is {words.shown(value)}; it must be a finite number of at least 0")
 
 
 def planned_start_s(now_s: float, at_s: float | None) -> float:
@@ -66,8 +65,8 @@ def load_of(drive: words.Drive, resistance_ohm: float) -> Load:
         raise words.LimitError(f"drive is {drive!r}; it must be a Pulse or an Effect")
     if isinstance(drive, words.Effect):
         return Load(on_s=0.0, heat_J=0.0)
-    if not (is_finite(resistance_ohm) and resistance_ohm > 0):
-        shown_ohm = shown(resistance_ohm)
+    if not (words.is_finite(resistance_ohm) and resistance_ohm > 0):
+        shown_ohm = words.shown(resistance_ohm)
         raise words.LimitError(
             f"resistance_ohm is {shown_ohm}; it must be finite and above 0 to estimate the coil's heat"
         )
@@ -90,10 +89,12 @@ class DriveHistory:
     def __post_init__(self) -> None:
         ticks = (self.warmth_tick, *(() if self.ready_tick is None else (self.ready_tick,)), *chain(*self.pulses))
         one_of_each_type = {type(tick): tick for tick in ticks}.values()  # a train's hundreds are judged at every shot
-        if not all(map(is_whole_number, one_of_each_type)):
+        if not all(map(words.is_whole_number, one_of_each_type)):
             raise words.LimitError("a history of shots counts in whole microseconds")
-        if not (is_finite(self.warmth_K) and self.warmth_K >= 0):
-            raise words.LimitError(f"warmth_K is {shown(self.warmth_K)}; it must be a finite number of at least 0")
+        if not (words.is_finite(self.warmth_K) and self.warmth_K >= 0):
+            raise words.LimitError(
+                f"warmth_K is {words.shown(self.warmth_K)}; it must be a finite number of at least 0"
+            )
 
     def earliest_s(self, load: Load) -> float:
         """The earliest time at which `load` may start, -inf if nothing was fired yet, inf if never.
@@ -179,8 +180,8 @@ class DriveHistory:
 
 
 def _tick(name: str, time_s: float) -> int:
-    if not is_finite(time_s):
-        raise words.LimitError(f"{name} is {shown(time_s)}; it must be a finite time in seconds")
+    if not words.is_finite(time_s):
+        raise words.LimitError(f"{name} is {words.shown(time_s)}; it must be a finite time in seconds")
     return round(time_s * TICKS)
 
 

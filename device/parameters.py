@@ -9,8 +9,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
-from device.values import is_finite, is_whole_number, shown
-from device.words import MAX_EFFECT
+from device.words import MAX_EFFECT, is_finite, is_whole_number, shown
 
 DriveOff = Literal["shorted", "open"]
 Emf = Literal["printed", "reciprocal"]

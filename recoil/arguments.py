@@ -9,7 +9,7 @@ from numbers import Real
 from pathlib import Path
 
 from device.messages import RecoilError
-from device.values import is_number, is_whole_number
+from device.words import is_number, is_whole_number
 from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.load import find

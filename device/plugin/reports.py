@@ -11,8 +11,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, get_args
 
 from device.methods import Rendering
-from device.values import is_finite, is_whole_number
-from device.words import GunState, GunStatus, Pulse, Shot, ShotReport, ShotTiming
+from device.words import GunState, GunStatus, Pulse, Shot, ShotReport, ShotTiming, is_finite, is_whole_number
 
 HANDED_OVER_S = 0.05
 """So long before its time a shot is handed to the plug-in; until then the guard alone waits. Assumed: a train's shots

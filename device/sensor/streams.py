@@ -15,8 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from device.physics.hand import Vector
-from device.values import is_finite
-from device.words import DeviceError
+from device.words import DeviceError, is_finite
 
 Sample = tuple[float, float]
 """Seconds on the sensor's own clock, which never go back, and m/s2 along the barrel, recoil positive."""

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from statistics import NormalDist
 from typing import TYPE_CHECKING, TypeVar
 
-from device.values import is_whole_number
+from device.words import is_whole_number
 from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json
 from experiments.design.bits import Pcg64
