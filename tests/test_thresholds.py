@@ -19,7 +19,7 @@ from analysis.psychometric.priors import default_priors
 from analysis.report.figures import style
 from analysis.report.figures.style import method_marker
 from analysis.report.labels import labelled
-from analysis.summary.announced import names_of_tests
+from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.tracks import figure_tracks
@@ -266,9 +266,30 @@ def test_a_standard_with_an_interval_of_its_own_has_choices_over_itself_a_cautio
     assert [test.statistic for test in which.tests if test.name == "d_prime"] == [None]
     assert "d_prime" not in names_of_tests(one, one.questions["which"])
     said = " ".join(result_sentences("made", summary))
-    assert "No d′: the standard is always in one interval, so a lean to an answer is not balanced out" in said
+    assert "No d′ and no test against chance: the standard is always in one interval, so a lean" in said
+    assert {cell.p for cell in which.cells} == {None}
+    assert not any("against chance" in words for words in sentences_of_tests(one))
     (section,) = threshold_sections("made", summary)
     assert any(f"always in the {standard_interval} interval" in words for words in section.paragraphs)
+
+
+def test_yes_of_a_comparison_whose_interval_is_known_has_a_function_on_both_sides_of_the_standard() -> None:
+    """Without a known place a yes could be of either shot."""
+    trial = {"kind": "two-interval", "compare": "voltage_V", "standard": 14.0}
+    rows = [
+        {"participant_id": "A", "method": "asymmetric-1", "voltage_V": level, "stronger": "yes" if i < yes else "no"}
+        for level, yes in ((12.0, 3), (14.0, 10), (16.0, 18))
+        for i in range(20)
+    ]
+    for standard_interval, fitted in (("first", True), ("random", False)):
+        one = design(
+            factors={"method": {"levels": ["asymmetric-1"]}, "voltage_V": {"levels": [12.0, 14.0, 16.0]}},
+            trial=trial | {"standard_interval": standard_interval},
+            questions={"stronger": {"kind": "yes-no", "text": "Was the second stronger?"}},
+        )
+        found = thresholds(one, "stronger", pd.DataFrame(rows))
+        assert found is not None
+        assert (found.share, found.reason is None) == ("yes", fitted)
 
 
 def of_a_standard(standard: float, *, above: bool) -> Any:

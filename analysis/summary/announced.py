@@ -120,7 +120,7 @@ def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
     }
     names = names_of_tests(design, question)
     held = bool(design.adapted) and has_success(question)
-    by_chance = None if held else chance(question)
+    by_chance = None if held or design.trial.standard_interval != "random" else chance(question)
     if held and len(design.adapted) == 1:
         yield (
             f"a cumulative normal over {design.adapted[0]}, whose levels a procedure chose by the answers, is fitted "

@@ -144,7 +144,7 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
         cells=cells,
         tests=tests,
         left_out=found.left_out,
-        chance=chance(question),
+        chance=_chance(design, question),
         preferred=_preferred(design, question, scored) if _of_pair(design, name) else None,
         scale=_scale(question),
         held=_is_held(design, question),
@@ -156,6 +156,11 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
 def _not_above_0(question: QuestionConfig, column: pd.Series) -> int | None:
     """How many numbers have no logarithm, and so no score; `None` without any."""
     return int((pd.to_numeric(column) <= 0).sum()) or None if question.kind == "number" else None
+
+
+def _chance(design: DesignConfig, question: QuestionConfig) -> float | None:
+    """How often who does not know is right; unknown where the standard has an interval of its own: a lean decides."""
+    return chance(question) if design.trial.standard_interval == "random" else None
 
 
 def _is_held(design: DesignConfig, question: QuestionConfig) -> bool:
@@ -281,7 +286,7 @@ def _cell(design: DesignConfig, name: str, question: QuestionConfig, rows: pd.Da
     )
     if not question.correct:
         return described
-    by_chance = None if _is_held(design, question) else chance(question)  # what is held at a share says nothing of it
+    by_chance = None if _is_held(design, question) else _chance(design, question)  # what is held says nothing of it
     return _with_right(described, int(rows["score"].sum()), by_chance)
 
 

@@ -14,7 +14,7 @@ from analysis.summary.question_results import DesignTest
 from experiments.design.language import QuestionConfig, TrialConfig
 
 _TASKS: Mapping[str, Task] = {"two-interval": "two-interval", "pair": "two-interval", "abx": "abx", "oddity": "oddity"}
-_NOT_BALANCED = "the standard is always in one interval, so a lean to an answer is not balanced out"
+_NOT_BALANCED = "the standard is always in one interval, so a lean to an answer is in the shares of right answers"
 
 
 def sensitivity(

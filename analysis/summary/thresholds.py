@@ -174,7 +174,8 @@ def _unordered(design: DesignConfig, factor: str, share: FittedShare) -> str:
     if len(design.adapted) > 1:
         return f"the procedure chose levels of {' and '.join(design.adapted)} together, and a function is of one"
     standard, levels = design.trial.standard, _numbers(design.factors[factor].all_levels)
-    if share == "chosen" or standard is None or isinstance(standard, str):
+    known = share == "yes" and design.trial.standard_interval != "random"  # yes is said of the comparison
+    if share == "chosen" or known or standard is None or isinstance(standard, str):
         return ""
     if min(levels) < standard < max(levels):
         return f"the levels lie on both sides of the standard, {shown_level(standard)}: no single function rises there"

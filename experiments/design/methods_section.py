@@ -260,13 +260,13 @@ def _several_intervals(design: DesignConfig, planned: PlannedRun) -> str:
     if trial.kind == "oddity":
         return f"three shots {gap}, two at {named}, in random places"
     if standard == EMPTY:
-        return f"two intervals {gap}, one of them empty, {_which_first(trial)}"
-    return f"two shots {gap}, one at {named}, {_which_first(trial)}"
+        return f"two intervals {gap}, one of them empty, {_which_first(trial, 'the {}')}"
+    return f"two shots {gap}, one at {named}, {_which_first(trial, 'in the {} interval')}"
 
 
-def _which_first(trial: TrialConfig) -> str:
+def _which_first(trial: TrialConfig, where: str) -> str:
     fixed = trial.standard_interval
-    return "each equally often first" if fixed == "random" else f"always in the {fixed} interval"
+    return "each equally often first" if fixed == "random" else f"always {where.format(fixed)}"
 
 
 def _questions(design: DesignConfig) -> Iterator[str]:

@@ -303,7 +303,7 @@ def far_thresholds(design: DesignConfig, laws: SyntheticAnswers) -> Iterator[str
         if levels and not min(levels) / _FAR <= law.threshold <= max(levels) * _FAR:
             yield (
                 f"questions.{name}.threshold = {law.threshold:g}: the levels of {law.factor} are {min(levels):g} to "
-                f"{max(levels):g}, so people answer alike at all of them; give the threshold in the unit of the levels"
+                f"{max(levels):g}, all of them far from it; give the threshold in the unit of the levels"
             )
 
 

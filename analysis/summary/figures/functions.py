@@ -114,9 +114,12 @@ def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
 def _draw(axes: Axes, curves: Sequence[_Curve], levels: FloatArray) -> None:
     light_grid(axes)
     apart = (levels[-1] - levels[0]) * min(_ASIDE, _ALL_ASIDE / max(1, len(curves) - 1))
-    alarms = {curve.alarms: method_colour(i) for i, curve in enumerate(curves) if curve.alarms is not None}
-    for share, colour in alarms.items():
-        reference_line(axes, 100 * share, "", colour if len(alarms) > 1 else GREY)
+    alarms: dict[float, list[str]] = {}
+    for i, curve in enumerate(curves):
+        if curve.alarms is not None:
+            alarms.setdefault(curve.alarms, []).append(method_colour(i))
+    for share, colours in alarms.items():  # grey where it is of several curves, or of all
+        reference_line(axes, 100 * share, "", colours[0] if len(alarms) > 1 and len(colours) == 1 else GREY)
     for i, curve in enumerate(curves):
         colour, aside = method_colour(i), apart * (i - (len(curves) - 1) / 2)  # marks of several would hide each other
         if curve.shares is not None:

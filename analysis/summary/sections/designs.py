@@ -186,7 +186,7 @@ def _sensitivity_words(question: QuestionSummary) -> Iterator[str]:
     """d′ of all answers, and that of people in the mean; conditions follow, and are in the table."""
     of_all = {test.name: test for test in reversed(question.tests) if test.name in _SENSITIVITY}
     if "d_prime" in of_all and of_all["d_prime"].reason:
-        yield f"No d′: {of_all['d_prime'].reason}."
+        yield f"No d′ and no test against chance: {of_all['d_prime'].reason}."
     elif "d_prime" in of_all:
         corrected = " with the log-linear correction" if question.detected else ""
         one = max(cell.people for cell in question.cells) == 1

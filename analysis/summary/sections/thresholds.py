@@ -120,7 +120,7 @@ def _what(of: Thresholds) -> str:
 
 
 def _in_one_order(of: Thresholds) -> Iterator[str]:
-    if of.standard_interval != "random":
+    if of.standard_interval != "random" and isinstance(of.standard, float):
         yield (
             f"The standard was always in the {of.standard_interval} interval, so the {_measure(of)} holds what the "
             "order does to a comparison (the time-order error) and any lean to an answer: a distance from the standard "
@@ -213,7 +213,8 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
         if (share := alarm_share(one.people)) is not None
     ]
     unknown = "false alarms in catch trials, straight across" if alarms else ""
-    dashed = "the standard" if of.share == "chosen" else "chance" if of.guess is not None else unknown
+    chosen = of.share == "chosen" and isinstance(of.standard, float)
+    dashed = "the standard" if chosen else "chance" if of.guess is not None else unknown
     group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
     aside = ", those of one level side by side" if len(of.conditions) > 1 else ""
     caption = (
