@@ -258,13 +258,24 @@ def test_a_number_beyond_the_central_95_percent_is_called_at_odds(fitted: Fitted
     assert fitted.judged is not None
     case = fitted.judged.main_case
     assert verdict_sentence(case).startswith("Every number that was not fitted lies within")
-    far = replace(case, places=(replace(case.places[0], outside=0.01), *case.places[1:]))
-    places = tuple(replace(place, outside=0.01) if place.published.startswith("73") else place for place in case.places)
+    odd = {"percentile": 0.005, "ci_low": 0.001, "ci_high": 0.02}
+    far = replace(case, places=(replace(case.places[0], **odd), *case.places[1:]))
+    places = tuple(replace(place, **odd) if place.published.startswith("73") else place for place in case.places)
     odd_count = replace(case, places=places)
     assert verdict_sentence(odd_count) == verdict_sentence(case)  # 67 gives the same printed p
     assert verdict_sentence(far).startswith(
         "At odds with the paper (outside the central 95 % of the studies): F(2, 26)"
     )
+
+
+def test_five_studies_put_no_number_at_odds_with_the_paper(cases: list[Case]) -> None:
+    """Wilson's interval of none of five reaches to 43 %."""
+    case = judged(cases[1], 5)
+    place = next(place for place in case.places if place.quantity.startswith("F(2, 26)"))
+    lowest = replace(place, percentile=0.0, ci_low=0.0, ci_high=0.434, outside=0.0)
+    words = verdict_sentence(replace(case, places=(lowest,)))
+    assert words.startswith("Too few studies to tell whether these lie within their central 95 %: F(2, 26)")
+    assert "whole pattern" in words
 
 
 # refusals

@@ -194,16 +194,26 @@ def verdict_sentence(case: Judged) -> str:
     for place in case.places:
         if not place.fitted:
             places.setdefault(place.quantity, []).append(place)
-    odd = [
-        f"{quantity} = {' or '.join(place.published for place in alike)}"
-        for quantity, alike in places.items()
-        if all(place.outside < OUTSIDE for place in alike)
-    ]
+    found: dict[str, list[str]] = {}
+    for quantity, alike in places.items():
+        found.setdefault(_verdict(alike), []).append(f"{quantity} = {' or '.join(one.published for one in alike)}")
     whole = next(claim for claim in case.claims if claim.claim == WHOLE_PATTERN)
     recurs = f"the whole pattern of significance recurs in {apa.percent(whole.share)} of the studies {_percents(whole)}"
-    if odd:
-        return f"At odds with the paper (outside the central 95 % of the studies): {'; '.join(odd)}; {recurs}."
-    return f"Every number that was not fitted lies within the central 95 % of the studies; {recurs}."
+    told = [f"{words}: {'; '.join(found[words])}" for words in (AT_ODDS, TOO_FEW) if words in found]
+    return f"{'; '.join(told or [WITHIN])}; {recurs}."
+
+
+AT_ODDS = "At odds with the paper (outside the central 95 % of the studies)"
+TOO_FEW = "Too few studies to tell whether these lie within their central 95 %"
+WITHIN = "Every number that was not fitted lies within the central 95 % of the studies"
+
+
+def _verdict(alike: Sequence[PublishedPlace]) -> str:
+    """Of the places of one printed number; a place is outside, or within, only if its whole interval is."""
+    low, high = OUTSIDE / 2.0, 1.0 - OUTSIDE / 2.0
+    if all(place.ci_high < low or place.ci_low > high for place in alike):
+        return AT_ODDS
+    return WITHIN if any(place.ci_low >= low and place.ci_high <= high for place in alike) else TOO_FEW
 
 
 def sections(found: FittedPercept, histograms: Sequence[Histograms], figures: Path) -> tuple[Section, ...]:
