@@ -20,7 +20,7 @@ from analysis.predict.drawn import DirectionStudies, studies_of
 from analysis.predict.jobs import on_cluster, on_processes
 from analysis.predict.power import run as feature
 from analysis.predict.power.grid import PowerRequest, make_grid, run_chunk
-from analysis.predict.power.page import claim_name
+from analysis.predict.power.page import claim_name, in_short
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
 from analysis.report.labels import labelled
 from analysis.report.serial import plain
@@ -339,6 +339,16 @@ def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_pat
     assert long["too_long"] == "3060 s a participant exceed fatigue.max_planned_s = 2700 s"
     chosen = next(row["design"] for row in found["smallest"] if row["claim"] == ALL_PAIRS)
     assert chosen is None or chosen["trials"] == 20
+
+
+@pytest.mark.slow
+def test_what_is_reached_only_by_keeping_people_too_long_is_told_so(tmp_path: Path) -> None:
+    """An ANOVA of 40 trials a method, whose interval starts above the target; of 10 it does not."""
+    request = PowerRequest(config="direction", participants="10", trials="10,40", effects="0.5", studies=50)
+    with on_processes(1):
+        found = feature.power(request, tmp_path, _silent, workers=1)
+    (line,) = (item for item in in_short(found).items if ", ANOVA, " in item)
+    assert line.endswith("effect × 0.5: none: what reaches it keeps a participant too long (at most 96.0 %)")
 
 
 @pytest.mark.slow

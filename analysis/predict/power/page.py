@@ -154,9 +154,18 @@ def _smallest(found: Power) -> Section:
 def _reached(found: Power, row: Smallest | None) -> str:
     if row is None:
         return apa.NO_NUMBER
+    if row.design is None and _reached_too_long(found, row):
+        return f"none: what reaches it keeps a participant too long (at most {apa.percent(row.most)})"
     if row.design is None:
         return f"none whose interval reaches it (at most {apa.percent(row.most)})"
     return _design_name(row.design, with_trials=_varies(found, "trials"))
+
+
+def _reached_too_long(found: Power, row: Smallest) -> bool:
+    """Whether a design reaches the target, and may not be run."""
+    same = [one for one in found.designs if one.too_long and (one.effect, one.methods) == (row.effect, row.methods)]
+    shares = [one.share_of(row.claim) for one in same]
+    return any(share is not None and share.ci_low >= found.target for share in shares)
 
 
 def _design_name(design: Reached, *, with_trials: bool) -> str:
