@@ -148,13 +148,16 @@ def test_what_is_not_felt_below_the_first_voltage_of_the_grid_is_no_contour_belo
     assert crossings(np.array([[0.76, 0.8, 0.9, 0.95]]), volts).tolist() == [-math.inf]
 
 
-def test_a_coarse_grid_has_the_contour_of_a_fine_one(fit: PerceptFit) -> None:
+def test_a_coarse_grid_has_the_contour_of_a_fine_one_within_its_band(fit: PerceptFit) -> None:
+    """Of the coarse one the band began at a voltage of the grid, above the solved voltage."""
     found = {}
     for grid in (4, 7):
         space = make_space(DesignRequest(grid=grid, voltage="0-24", pulse="0.01"))
         rows = rows_of(space, (0.01,), (0.02,))
         with on_processes(1) as run:
             layer = layers(space, rows, simulate_rows(rows, run, lambda _done: None))[0.01]
-        found[grid] = contour_of(space, layer, fit, 1).voltage_V[list(space.friction_N).index(1.12)]
+        contour, place = contour_of(space, layer, fit, 1), space.friction_N.index(1.12)
+        found[grid] = contour.voltage_V[place]
+        assert contour.band.low_V[place] <= found[grid] < contour.band.high_V[place]
     assert found[4] == pytest.approx(found[7], abs=0.01)
     assert found[4] == pytest.approx(7.9, abs=0.1)

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.predict.design_search.space import Layer, Space, shot_of
+from analysis.predict.design_search.space import Layer, Space, one_more, shot_of
 from analysis.predict.fit.percept_model import FITTED, PAPER_RATES, PerceptFit, best_percept
 from analysis.stats.arrays import FloatArray
 from device.limits import TRAIN_LIMITS, broken_limit
@@ -239,25 +239,27 @@ def _reached(voltage_V: float) -> str:
 
 
 def contour_of(space: Space, layer: Layer, fit: PerceptFit, seed: int) -> Contour:
-    """The contour of a layer, solved with shots of its own, and its band by draws from the fit."""
+    """The contour of a layer, solved with shots of its own, and its band by draws on the grid and these shots."""
     felt = layer.felt[fit.parameters.leak_s]
     volts, gun = np.array(space.voltage_V), replace(space.gun, pulse_s=layer.pulse_s)
     rough = crossings(rates(felt, fit.parameters), volts)
-    exact = [
-        _solved(replace(gun, friction_N=f), volts, float(v), fit.parameters)
-        for f, v in zip(space.friction_N, rough, strict=True)
-    ]
+    exact = np.array(
+        [
+            _solved(replace(gun, friction_N=f), volts, float(v), fit.parameters)
+            for f, v in zip(space.friction_N, rough, strict=True)
+        ]
+    )
     return Contour(
-        voltage_V=np.array(exact),
+        voltage_V=exact,
         interpolated_V=rough,
         lasting=tuple(_lasts(row) for row in rates(felt, fit.parameters)),
-        band=band_of(drawn_contours(felt, volts, fit, seed)),
+        band=band_of(drawn_contours(*one_more(space, layer, fit.parameters.leak_s, exact), fit, seed)),
     )
 
 
 def crossings(found: FloatArray, volts: FloatArray) -> FloatArray:
     """Where each row (frictions, voltages) of rates first reaches the level, linear between two voltages."""
-    return np.array([_crossing(row, volts) for row in found])
+    return np.array(list(map(_crossing, found, np.broadcast_to(volts, found.shape))))
 
 
 def _crossing(row: FloatArray, volts: FloatArray) -> float:

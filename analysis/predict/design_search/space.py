@@ -328,3 +328,15 @@ def _layer(pulse_s: float, leaks_s: Sequence[float], grid: Sequence[Sequence[Sho
 
 def _numbers(percept: Percept | None) -> tuple[float, float, float]:
     return (math.nan,) * 3 if percept is None else (percept.first, percept.reaction, percept.second)
+
+
+def one_more(space: Space, layer: Layer, leak_s: float, more_V: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A layer's percepts and voltages with one more voltage of each friction; the lowest again where it is none."""
+    felt, volts = [], []
+    for friction_N, row, voltage_V in zip(space.friction_N, layer.felt[leak_s], more_V.tolist(), strict=True):
+        more = voltage_V if math.isfinite(voltage_V) else space.voltage_V[0]
+        gun = replace(space.gun, pulse_s=layer.pulse_s, friction_N=friction_N, voltage_V=more)
+        shot, place = shot_of(gun, simulate(gun), (leak_s,)), int(np.searchsorted(space.voltage_V, more))
+        felt.append(np.insert(row, place, _numbers(shot.felt[0] if shot.felt else None), axis=0))
+        volts.append(np.insert(space.voltage_V, place, more))
+    return np.array(felt), np.array(volts)
