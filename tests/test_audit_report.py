@@ -28,6 +28,7 @@ from analysis.paper.audit.page import (
 )
 from analysis.paper.audit.printed import CheckResult
 from analysis.paper.audit.run import audit, load_paper_file
+from analysis.paper.audit.variance_ratios import between_f
 from analysis.report.serial import plain
 from experiments.config.door import ConfigError
 from tests.conftest import Recoil
@@ -207,6 +208,12 @@ def test_what_no_data_can_have_is_refused_by_its_option(given: tuple[str, int, s
 
 def test_one_number_is_one_number() -> None:
     assert "\n1 number: 1 attainable." in findings_text([of(grim("5.21", 28))])
+
+
+def test_of_an_f_whose_means_cannot_be_these_are_named() -> None:
+    """49/12 = 4.08 and 50/12 = 4.17; 63/12 = 5.25 and 64/12 = 5.33; 75/12 = 6.25."""
+    said = sentences(of(between_f("8.50", (12, 12, 12), ("4.10", "5.30", "6.25"))))[0]
+    assert "6.25 (no 12 of them have the mean 4.10, no 12 of them have the mean 5.30): no such data give it" in said
 
 
 def test_a_small_step_is_shown_and_not_rounded_to_none() -> None:

@@ -325,12 +325,12 @@ def _result(
     check: str, claim: _Claim, judged: JudgedReadings, sides: tuple[Fraction | None, Fraction | None]
 ) -> CheckResult:
     means = "unprinted means" if claim.means is None else f"means {', '.join(m.text for m in claim.means)}"
+    grain = f"scores in steps of {decimal(claim.scale.grain)} with {means}{_no_means(claim)}"
     return CheckResult(
         check=check,
         printed=f"F = {claim.F.text}",
         judged=judged,
-        reason=f"scores in steps of {decimal(claim.scale.grain)} with {means}: the error's sum of squares comes in "
-        f"steps{_next_to(sides)}",
+        reason=f"{grain}: the error's sum of squares comes in steps{_next_to(sides)}",
         source=_SOURCE,
         step=2 * claim.scale.grain**2 / (len(claim.sizes) if check.startswith("repeated") else 1),
         below=sides[0],
@@ -338,6 +338,13 @@ def _result(
         contradicts=() if judged.verdict in {"attainable", "undecided"} else (means, f"sizes {claim.sizes}"),
         numbers=_numbers(claim, check),
     )
+
+
+def _no_means(claim: _Claim) -> str:
+    """The means that no so many scores have, however they are rounded."""
+    each = zip(claim.means, claim.sizes, claim.sums(Rounding.ANY), strict=True) if claim.means else ()
+    none = dict.fromkeys(f"no {n} of them have the mean {mean.text}" for mean, n, sums in each if not sums)
+    return f" ({', '.join(none)})" if none else ""
 
 
 def _next_to(sides: tuple[Fraction | None, Fraction | None]) -> str:
