@@ -111,7 +111,7 @@ def audit(
     """Are the published numbers attainable and consistent? Each with its proof; exit code 1 if one is not."""
     from analysis.paper.audit import run as feature
 
-    audited = feature.audit_file(paper)
+    audited = feature.audit_file(paper, progress)
     feature.write(audited, out)
     show(audited.record, f"{audited.as_text()}\n\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=audited.exceptions)

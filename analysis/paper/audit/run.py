@@ -60,6 +60,7 @@ from analysis.paper.paper import PaperHead, Participants, PublishedDirection, Pu
 from analysis.report import placing
 from analysis.report.page import write_page
 from analysis.report.serial import NotebookResult, as_json, plain
+from analysis.report.terminal import Progress, Tell, unseen, untold
 from experiments.config.door import ConfigError, Model, load
 from experiments.config.setup import sha256
 from experiments.load import find
@@ -67,13 +68,17 @@ from experiments.record import storage
 from experiments.record.provenance import provenance
 
 
-def audit(paper: PaperFile) -> tuple[AuditFinding, ...]:
-    """The findings on all claims, those of the paper's sections first; pure, and the same at every call.
+def audit(paper: PaperFile, tell: Tell = untold) -> tuple[AuditFinding, ...]:
+    """The findings on all claims, those of the paper's sections first, the same at every call; `tell` hears of each.
 
     A claim whose numbers make none, such as a count above n, or are beyond what a check bears, is refused by its
     finding, with the rule; the others are judged.
     """
-    return tuple(_finding(claim) for claim in (*derived(paper), *paper.claims))
+    return tuple(_finding(claim, tell) for claim in _claims(paper))
+
+
+def _claims(paper: PaperFile) -> tuple[Claim, ...]:
+    return (*derived(paper), *paper.claims)
 
 
 def derived(paper: PaperFile) -> tuple[Claim, ...]:
@@ -88,11 +93,12 @@ def derived(paper: PaperFile) -> tuple[Claim, ...]:
     return tuple(claims)
 
 
-def _finding(claim: Claim) -> AuditFinding:
+def _finding(claim: Claim, tell: Tell) -> AuditFinding:
     try:
         result = claim.run()
     except ValueError as error:
         result = refusal(str(error))
+    tell(claim.place)
     return AuditFinding(place=claim.place, quote=claim.quote, note=claim.note, result=result, about=tuple(claim.about))
 
 
@@ -173,13 +179,15 @@ class Audited(NotebookResult):
         return sha256(self.paper.model_dump(mode="json"))
 
 
-def audit_file(name: str) -> Audited:
+def audit_file(name: str, progress: Progress = unseen) -> Audited:
     """The audit of a paper's file, or of a shipped one. `ConfigError` if it cannot be used, or no claim of it."""
     source = find(name)
     paper = load_paper_file(source)
-    findings = audit(paper)
-    if not findings:
+    claims = len(_claims(paper))
+    if not claims:
         raise ConfigError(f"{source}: makes no claims; give [[claims]], or the sections of a paper")
+    with progress("audit", claims) as tell:
+        findings = audit(paper, tell)
     if all(finding.result.verdict == "refused" for finding in findings):
         raise ConfigError("\n".join(f"{source}: {one.place}, “{one.quote}”: {one.result.reason}" for one in findings))
     return Audited(paper=paper, findings=findings, source=source)
