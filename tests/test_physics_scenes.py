@@ -128,6 +128,14 @@ def test_simulate_says_what_it_picked_for_a_scene_and_what_it_stands_for(recoil:
     said = recoil("simulate", "--need", "reset_end_s=0.02", "--set", "drive_off=open").stdout
     assert "model no-inductance, stated errors reset_end_s 0.014" in said
     assert "not promised: peak_force_N" in said
+    alone = recoil("simulate", "--fidelity", "ballistic").stdout
+    assert "drive_off shorted until the recoil is over (then no coil)" in alone
+
+
+def test_in_a_table_no_model_is_picked_that_takes_longer_there_than_the_full_one(recoil: Recoil) -> None:
+    """By `recoil bench`; one shot of this scene gets `ballistic`."""
+    done = recoil("simulate", "--scene", "sweep", "--vary", "friction_N=0.2,0.3", "--table", "shots.csv", "--json")
+    assert json.loads(done.stdout)["scene"]["fidelity"] == "full"
 
 
 @pytest.mark.slow

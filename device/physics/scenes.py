@@ -14,7 +14,7 @@ Operations of a shot of the paper's gun, counted (coil open, coil shorted): `clo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import product
 from typing import Literal
@@ -72,6 +72,8 @@ def stated_error(fidelity: str, output: str, drive_off: DriveOff, emf: Emf) -> f
 
 COSTS = ("closed-form", "no-inductance", "ballistic", "full")
 """The models, the cheapest first, over both states of the coil: shorted, the two in the middle cost alike."""
+TABLE_COSTS = ("closed-form", "full")
+"""Those that pay in a table of shots: in compiled batches the two in the middle take longer than `full`."""
 COLLISION = "collision_force_N"
 NEEDED = (*OUTPUTS, COLLISION)
 """What a scene may need."""
@@ -147,14 +149,18 @@ class ModelChoice:
     reason: str = ""
 
 
-def choose_model(scene: Scene, gun: GunParameters = _PAPER, **arrays: ArrayLike) -> ModelChoice:
+def choose_model(
+    scene: Scene, gun: GunParameters = _PAPER, costs: Sequence[str] = COSTS, **arrays: ArrayLike
+) -> ModelChoice:
     """The cheapest model within what the scene bears, for a gun, or for guns whose numbers are in `arrays`.
+
+    Cheapest is the first of `costs`, whose last is `full`.
 
     >>> choose_model(SCENES["sweep"]).fidelity, choose_model(SCENES["sweep"], GunParameters(voltage_V=5.0)).fidelity
     ('ballistic', 'full')
     """
     refused = [_far_from_paper(gun, arrays) or ("only full gives the course over time" if scene.curves else "")]
-    for fidelity in () if refused[0] else COSTS[:-1]:
+    for fidelity in () if refused[0] else costs[:-1]:
         errors = _errors(fidelity, scene, gun, arrays)
         beyond = next((output for output, error in errors.items() if error > scene.needs[output]), None)
         if beyond is None:

@@ -12,7 +12,17 @@ from analysis.predict.simulate.request import ModelRequest
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL
 from device.parameters import GunParameters
-from device.physics.scenes import COLLISION, NEEDED, SCENES, ModelChoice, Scene, choose_contact, choose_model
+from device.physics.scenes import (
+    COLLISION,
+    COSTS,
+    NEEDED,
+    SCENES,
+    TABLE_COSTS,
+    ModelChoice,
+    Scene,
+    choose_contact,
+    choose_model,
+)
 from experiments.config.door import ConfigError
 
 _OWN = "needs of your own"
@@ -36,7 +46,7 @@ def picked(request: ModelRequest, gun: GunParameters, varied: Mapping[str, Array
     scene = _scene(request)
     if scene is None:
         return request.fidelity or "full", None
-    choice = choose_model(scene, gun, **varied)
+    choice = choose_model(scene, gun, TABLE_COSTS if varied else COSTS, **varied)
     return choice.fidelity, ScenePick(**asdict(choice), needs=dict(scene.needs), why=scene.why)
 
 

@@ -227,13 +227,16 @@ def sections(found: SimulatedShot) -> tuple[Section, ...]:
     options = {
         "friction_N": p.friction_N,
         "return_friction_N": p.return_friction_N,
-        "drive_off": p.drive_off,
+        "drive_off": f"{p.drive_off}{_NO_COIL if found.fidelity == 'ballistic' else ''}",
         "emf": p.emf,
     }
     said = ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
     scene = () if found.scene is None else (scene_section(found.scene),)
     shot = Section(title=f"One shot, model {found.fidelity}, {said}", items=_rows(found.summary))
     return *scene, shot, *_more(found)
+
+
+_NO_COIL = " until the recoil is over (then no coil)"
 
 
 def _more(found: SimulatedShot) -> Iterator[Section]:
