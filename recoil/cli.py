@@ -164,7 +164,8 @@ _AGAIN_S = 0.05
 def _interrupt(number: int, _: object) -> None:
     """Say so here, since the command line's library catches the exception on its way, and ends with 130."""
     if not _INTERRUPTED_BY:
-        say("\nrecoil: interrupted; what was acknowledged is on the disk")
+        acknowledged = "; what was acknowledged is on the disk" if sys.argv[1:2] == ["run"] else ""
+        say(f"\nrecoil: interrupted{acknowledged}")
     _INTERRUPTED_BY.append(number)
     raise KeyboardInterrupt(signal.Signals(number).name)
 
