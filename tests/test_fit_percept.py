@@ -289,6 +289,10 @@ def test_five_studies_put_no_number_at_odds_with_the_paper(cases: list[Case]) ->
         (PerceptRequest(rates="vibration=0.5,vibration=0.7,asymmetric-2=0.9"), "vibration stands there twice"),
         (PerceptRequest(rates="vibration=0.5,ramp=0.7,asymmetric-2=0.9"), "no such method"),
         (PerceptRequest(trials=20), "--trials 20"),
+        (
+            PerceptRequest(rates="vibration=0.5,asymmetric-1=0.7,asymmetric-2=0.9", studies=10),
+            "--studies 10: with --rates",
+        ),
         (PerceptRequest(spread=-1.0), "--spread -1"),
         (PerceptRequest(paper="nowhere"), "nowhere"),
         (PerceptRequest(gun="paper"), "paper.toml"),

@@ -218,7 +218,8 @@ SpreadOption = Annotated[
     float, typer.Option(metavar="FACTOR", help="People differ by so many times the assumed spread; 0: all alike.")
 ]
 StudiesOption = Annotated[
-    int, typer.Option(min=0, max=10_000_000, help="Simulated studies to judge the fit by; 0: none.")
+    int | None,
+    typer.Option(min=0, max=10_000_000, help="Simulated studies to judge a paper's fit by (10000); 0: none."),
 ]
 
 
@@ -230,7 +231,7 @@ def percept(
     trials: TrialsOption = None,
     gun: terminal.GunConfigOption = "gun",
     spread: SpreadOption = 0.0,
-    studies: StudiesOption = 10_000,
+    studies: StudiesOption = None,
     seed: terminal.FixedSeedOption = 1,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
         "results/fit"

@@ -49,7 +49,7 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
     `ConfigError`: rates or files that cannot be used.
     """
     task = read_request(request)
-    pieces = len(piece_sizes(request.studies, task.published.n)) if task.published else 0
+    pieces = len(piece_sizes(task.studies, task.published.n)) if task.published else 0
     with placing.results_in(out, placing.FIT_FILE) as part, labelled(task.labels):
         with progress("fit", 2 + len(OTHERS) + CASES * pieces) as tell:
             fit = fit_percept(task.rates, task.methods, trials=task.trials, people=task.people)
@@ -81,11 +81,10 @@ def _judged(
         return None, []
     cases = cases_of(task.rates, task.methods, task.trials, fit.parameters)
     judged = [
-        judge(case, task.methods, task.published, studies=request.studies, seed=request.seed, tell=tell)
-        for case in cases
+        judge(case, task.methods, task.published, studies=task.studies, seed=request.seed, tell=tell) for case in cases
     ]
     judgement = Judgement(
-        studies=request.studies,
+        studies=task.studies,
         seed=request.seed,
         main=[case.name for case in cases].index(MAIN),
         percentiles=PERCENTILES,

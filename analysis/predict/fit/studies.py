@@ -46,8 +46,12 @@ class PerceptRequest:
     trials: int | None = None
     gun: str = "gun"
     spread: float = 0.0
-    studies: int = 10_000
+    studies: int | None = None
     seed: int = 1
+
+
+STUDIES = 10_000
+"""To judge a fit to a paper by, where nothing else is asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +68,7 @@ class PerceptTask:
     methods: Mapping[str, Method]
     people: People
     published: PublishedDirection | None
+    studies: int
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -71,6 +76,9 @@ def read_request(request: PerceptRequest) -> PerceptTask:
     """The task of a request. `ConfigError`: rates, trials, a paper or a gun that cannot be used."""
     if not 0.0 <= request.spread <= _LARGEST_SPREAD:
         raise ConfigError(f"--spread {request.spread:g}: must be a factor from 0 (people alike) to {_LARGEST_SPREAD:g}")
+    studies = STUDIES if request.studies is None else request.studies
+    if request.rates is not None and request.studies:
+        raise ConfigError(f"--studies {studies}: with --rates nothing is published to judge by; leave one of them out")
     if request.rates is not None:
         published, source = None, "the given rates"
         rates, trials = given_rates(request.rates), PAPER_TRIALS if request.trials is None else request.trials
@@ -88,6 +96,7 @@ def read_request(request: PerceptRequest) -> PerceptTask:
         methods=_methods(find(request.gun), gun, rates),
         people=assumed_spread(request.spread),
         published=published,
+        studies=studies,
         labels=gun.labels,
     )
 
