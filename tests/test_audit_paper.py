@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -111,6 +112,18 @@ def test_a_claim_has_the_arguments_of_its_check_and_no_others() -> None:
         if kind in CHECKS:
             names = set(model.model_fields) - set(Claim.model_fields) - {"kind"}
             assert names == set(inspect.signature(CHECKS[kind]).parameters), kind
+
+
+def test_the_page_on_papers_has_every_check_with_its_arguments() -> None:
+    page = (ROOT.parent / "docs" / "howto" / "check-a-paper.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([a-z-]+)` \|.*\|(.*)\|(.*)\|$", page, re.MULTILINE)
+    told = {kind: [set(re.findall(r"`(\w+)`", cell)) for cell in cells] for kind, *cells in rows}
+    own: dict[str, list[set[str]]] = {}
+    for model in AnyClaim.__args__[0].__args__:
+        some = {name: one for name, one in model.model_fields.items() if name not in {*Claim.model_fields, "kind"}}
+        needed = {name for name, one in some.items() if one.is_required()}
+        own[model.model_fields["kind"].annotation.__args__[0]] = [needed, set(some) - needed]
+    assert told == own
 
 
 def test_every_check_names_its_source() -> None:

@@ -208,6 +208,13 @@ def test_what_no_data_can_have_is_refused_by_its_option(given: tuple[str, int, s
         mean_and_sd(*given)
 
 
+def test_of_one_mean_no_file_is_named() -> None:
+    """Its JSON goes to the screen, with the data that give it."""
+    found = plain(mean_and_sd("3.48", 23).mean)
+    assert found["sentences"][1].endswith("data that give it are in the JSON, as `data`.")
+    assert found["data"]
+
+
 def test_one_number_is_one_number() -> None:
     assert "\n1 number: 1 attainable." in findings_text([of(grim("5.21", 28))])
 

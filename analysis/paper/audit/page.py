@@ -191,7 +191,7 @@ def _why_attainable(result: CheckResult) -> str:
     if result.check == "Tukey pattern" and result.numbers:
         return "; ".join(f"{pair}: {found}" for pair, found in result.numbers) + "."
     if result.judged.witness and result.check in _DATA:
-        return "It needs no special reading, and data that give it are in audit.json."
+        return "It needs no special reading, and data that give it are in the JSON, as `data`."
     return "It needs no special reading."
 
 

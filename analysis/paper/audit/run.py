@@ -14,23 +14,8 @@ sd = "1.60"
 n = 28
 ```
 
-The other keys of a claim are the arguments of its check (`claims` has them with their types):
-
-| kind | keys (those after ; may be left out) |
-| --- | --- |
-| grim | mean, n; grain, items, low, high |
-| grimmer | mean, sd, n; grain, items, low, high |
-| debit | mean, sd, n |
-| percent | percent, count, n |
-| df | df, design, counts |
-| p | statistic, value, p; df, sides |
-| binomial | p, n; chance, counts |
-| repeated-f | F, n, k; means, grain, low, high, transforms, other_grains |
-| between-f | F, sizes; means, grain, low, high |
-| tukey | F, sizes, comparisons ({higher, lower, p, p_at_least}); means, repeated, grain, low, high |
-| total | printed, terms ({times, over}); bound ("equals", "at least", "at most") |
-| stated | printed; unit |
-| unpublished | quantity |
+The other keys of a claim are the arguments of its check: docs/howto/check-a-paper.md has a table of them,
+`claims` their types.
 
 Every claim may also have a `note` on how the file reads the paper, and `about`, the names of the numbers of Recoil's
 own comparison that it is about. `[participants]`, `[direction]` and `[preference]`, if there, give claims of their own
