@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import re
 import signal
 import sys
 import threading
+import time
 from _thread import interrupt_main
 from collections.abc import Sequence
 from copy import copy
@@ -159,10 +161,20 @@ _INTERRUPTED_BY: list[int] = []
 """The signals that came, in their order."""
 
 _AGAIN_S = 0.05
+_AT_ONCE_S = 0.1
+"""What comes so soon after an interrupt is the same one, such as the SIGTERM of a program that sent SIGINT before."""
+_RAISED_S = [-math.inf]
 
 
 def _interrupt(number: int, _: object) -> None:
-    """Say so here, since the command line's library catches the exception on its way, and ends with 130."""
+    """Say so here, since the command line's library catches the exception on its way, and ends with 130.
+
+    What comes at once after it cuts short no clearing up.
+    """
+    now_s = time.monotonic()
+    if now_s - _RAISED_S[0] < _AT_ONCE_S:
+        return
+    _RAISED_S[0] = now_s
     if not _INTERRUPTED_BY:
         acknowledged = "; what was acknowledged is on the disk" if sys.argv[1:2] == ["run"] else ""
         say(f"\nrecoil: interrupted{acknowledged}")
@@ -175,6 +187,7 @@ def _interrupt_again(ignored: sys.UnraisableHookArgs) -> None:
     if not isinstance(ignored.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(ignored)
         return
+    _RAISED_S[0] = -math.inf
     again = threading.Timer(_AGAIN_S, interrupt_main, _INTERRUPTED_BY[-1:])
     again.daemon = True
     again.start()

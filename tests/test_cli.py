@@ -313,6 +313,28 @@ cli.main()
 """
 
 
+_A_SECOND_INTERRUPT_COMES_AT_ONCE = """
+import signal
+from recoil import cli
+
+def command() -> None:
+    try:
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.raise_signal(signal.SIGTERM)
+        print("cleared up")
+
+cli._line_of = lambda words: command
+cli.main()
+"""
+
+
+def test_a_second_interrupt_at_once_cuts_short_no_clearing_up() -> None:
+    command = [sys.executable, "-c", _A_SECOND_INTERRUPT_COMES_AT_ONCE]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr.strip()) == (130, "cleared up\n", "recoil: interrupted")
+
+
 @pytest.mark.parametrize(("command", "said"), [("run", "; what was acknowledged is on the disk"), ("audit", "")])
 def test_only_where_answers_are_acknowledged_is_it_said_that_they_are_on_the_disk(command: str, said: str) -> None:
     words = [sys.executable, "-c", _A_LIBRARY_MAKES_AN_ERROR_OF_AN_INTERRUPT, command]
