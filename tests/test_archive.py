@@ -439,6 +439,12 @@ def test_other_versions_may_differ_by_a_millionth_of_a_millionth(copy: Path, by:
     assert ("other versions" in said) == whole
 
 
+def test_of_an_emptied_manifest_that_is_said_and_no_file_called_foreign(copy: Path) -> None:
+    (copy / manifest.MANIFEST_FILE).write_text("")
+    with pytest.raises(PlaceError, match=f"{manifest.MANIFEST_FILE} is empty, so nothing vouches"):
+        verify(copy)
+
+
 def test_an_archive_without_its_manifest_is_none(copy: Path) -> None:
     (copy / manifest.MANIFEST_FILE).rename(copy / "other.txt")
     with pytest.raises(

@@ -42,6 +42,10 @@ def read_manifest(folder: Path) -> Hashes:
         there = "is no plain file" if path.is_symlink() or path.exists() else "is not there"
         raise PlaceError(f"{folder}: is no archive of Recoil, or not a whole one: {MANIFEST_FILE} {there}")
     data = path.read_bytes()
+    if not data.strip():
+        raise PlaceError(
+            f"{folder}: {MANIFEST_FILE} is empty, so nothing vouches for the other files; get a whole copy"
+        )
     lines = data.decode("utf-8", "surrogateescape").split("\n")
     found = {match[2]: match[1] for line in lines if (match := _LINE.fullmatch(line))}
     faults = [
