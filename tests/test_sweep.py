@@ -200,6 +200,14 @@ def test_a_table_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["shots.csv", "shots.csv.json"]
 
 
+def test_a_table_that_cannot_be_made_is_named_as_it_was_asked_for(tmp_path):
+    """The name of the part is a few letters longer: beyond what a file system has."""
+    table = tmp_path / f"{'x' * 246}.csv"
+    with pytest.raises(OSError, match="too long") as refused:
+        swept(table, "friction_N=0.2,0.3")
+    assert refused.value.filename == str(table)
+
+
 def test_an_interrupted_table_leaves_nothing_and_ends_with_130(tmp_path):
     part = tmp_path / ".shots.parquet.part"
     words = ("--vary", "friction_N=0.1:1.2:3000", "--vary", "voltage_V=12:24:3000", "--table", "shots.parquet")

@@ -252,6 +252,13 @@ def test_what_is_no_command_is_refused_by_its_number(strict, text, code):
     assert [refusal_in(answer)[0] for answer in strict.say(text)] == [code]
 
 
+def test_a_link_that_cannot_be_made_is_named_as_it_was_asked_for(tmp_path: Path) -> None:
+    line = Pty(tmp_path / "nowhere" / "gun")
+    with pytest.raises(OSError, match=f"^{tmp_path / 'nowhere' / 'gun'}: No such file or directory$"):
+        line.plug()
+    line.unplug()
+
+
 def test_a_file_where_the_link_is_to_be_is_refused_and_kept(tmp_path: Path) -> None:
     precious = tmp_path / "journal.jsonl"
     precious.write_bytes(b"kept")

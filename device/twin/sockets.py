@@ -65,8 +65,11 @@ class Pty:
         self.address = str(self._link or name)
         if self._link is not None:
             beside = self._link.with_name(f".{self._link.name}-{os.getpid()}")
-            beside.symlink_to(name)
-            beside.replace(self._link)
+            try:
+                beside.symlink_to(name)
+                beside.replace(self._link)
+            except OSError as error:
+                raise OSError(f"{self._link}: {error.strerror}") from error  # nobody knows the other name
 
     def unplug(self) -> None:
         """Both ends are closed: the host's descriptor is dead, its path leads nowhere."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import IO, Any
@@ -153,15 +153,18 @@ def _whole(path: Path) -> Iterator[IO[bytes]]:
     """A file under another name, synced and renamed at the end."""
     storage.make_folder(path.parent)
     part = path.with_name(f".{path.name}.part")
-    part.unlink(missing_ok=True)
     try:
-        with storage.errors_name(path), os.fdopen(storage.create(part), "wb") as stream:
+        part.unlink(missing_ok=True)
+        with os.fdopen(storage.create(part), "wb") as stream:
             yield stream
             stream.flush()
             storage.sync(stream.fileno())
         part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
+    except BaseException as error:
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(path), None  # nobody knows the other name
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise
     storage.sync_folder(path.parent)
 
