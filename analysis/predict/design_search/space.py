@@ -28,8 +28,8 @@ from experiments.synthetic.percept import Percept, percept_of_course, percept_of
 LEAST_GRID, MOST_GRID = 4, 200
 LEAST_PULSE_S = 0.002
 """Where the sweep of the pulse begins unless told otherwise; a shorter one hardly moves the magnet."""
-MOST = {"--friction": 1000.0, "--voltage": 1000.0, "--pulse": 1.0}
-"""Newton, volt and seconds: beyond, nothing is a gun for a hand."""
+MOST = {"--friction": (1000.0, "N"), "--voltage": (1000.0, "V"), "--pulse": (1.0, "s")}
+"""Beyond, nothing is a gun for a hand."""
 BEYOND_PRELOAD = 1.1
 """The sweep of the friction ends so far above what the pre-load can return, to show where that is."""
 
@@ -119,8 +119,9 @@ def span(option: str, text: str | None, default: tuple[float, float], *, single:
         example = f"{default[0]:g}-{default[1]:g}"
         raise ConfigError(f"{option} {text}: must be {form}, numbers of at least 0 such as {example}")
     low, high = float(found[1]), float(found[2] or found[1])
-    if high > MOST[option] or low > MOST[option]:
-        raise ConfigError(f"{option} {text}: must be at most {MOST[option]:g}")
+    most, unit = MOST[option]
+    if high > most or low > most:
+        raise ConfigError(f"{option} {text}: must be at most {most:g} {unit}")
     if low > high or (low == high and not single):
         raise ConfigError(f"{option} {text}: FROM must be below TO")
     return low, high
