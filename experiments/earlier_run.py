@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -203,12 +204,35 @@ def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iter
         return
     if not request.sensor and any(record.kind == "measured" for record in before.records):
         yield UNMEASURED
-    was, now = next(filter(None, (record.gun for record in reversed(before.records))), None), gun.identify()
+    was, now = gun_felt_last(before), gun.identify()
     if was is not None and was != now:
         yield (
             f"The gun was {_who(was)} until now, and is {_who(now)} from here on. If it is to be the same one, stop, "
             "and resume with the gun it had."
         )
+
+
+def gun_felt_last(contents: Contents) -> Identity | None:
+    """The gun that fired last; until one did, that of the beginning. On one that was only opened nothing was felt."""
+    last = gun = contents.head.gun
+    for record in contents.records:
+        gun = record.gun or gun
+        said = record.body.get("kind") if record.kind == "outcome" and isinstance(record.body, dict) else record.kind
+        if said in ("fired", "presented", "shot"):
+            last = gun
+    return last
+
+
+def way_back_to_gun(journal: Path, address: str) -> str:
+    """The option that resumes a run with the gun it has: an address, if what is there now fired last or began it."""
+    if address == "simulated":
+        return ""
+    with suppress(JournalError):
+        contents = begun(journal)
+        had = contents and gun_felt_last(contents)
+        if contents and had and had != next(filter(None, (record.gun for record in reversed(contents.records))), None):
+            return f" and --gun for the gun it had, {_who(had)}"
+    return f" --gun {shlex.quote(address)}"
 
 
 def _who(gun: Identity) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -19,7 +18,7 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.shown_texts import letters_of
-from experiments.earlier_run import begun_language, language_begun_in
+from experiments.earlier_run import begun_language, language_begun_in, way_back_to_gun
 from experiments.live_run import RunStopped, Screen
 from experiments.load import language_key
 from experiments.record import replay
@@ -89,9 +88,10 @@ def _how_to_go_on(request: RunRequest) -> str:
     """What to do about a run that was stopped."""
     if request.practice:
         return "A practice is begun anew each time: --practice."
-    begun = place(request.results, request.participant_id, request.setup.config.experiment).journal.exists()
-    gun = "" if request.gun == "simulated" else f" --gun {shlex.quote(request.gun)}"
-    return f"Go on with --resume{gun}." if begun else "Nothing of the run had begun."
+    journal = place(request.results, request.participant_id, request.setup.config.experiment).journal
+    if not journal.exists():
+        return "Nothing of the run had begun."
+    return f"Go on with --resume{way_back_to_gun(journal, request.gun)}."
 
 
 def _markers(results: Path, say: Callable[[str], None]) -> AbstractContextManager[None]:

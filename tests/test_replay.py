@@ -3,7 +3,7 @@
 import csv
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +17,7 @@ from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
-from experiments.earlier_run import NotAsItBegan, earlier_run
+from experiments.earlier_run import NotAsItBegan, earlier_run, way_back_to_gun
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.record.replay import go_on, history, replay
@@ -492,6 +492,13 @@ def test_a_run_that_began_on_a_gun_is_not_gone_on_with_where_nothing_is_felt(
     assert journal.read_bytes() == before
 
 
+class Sit(NamedTuple):
+    """Sittings on a gun that has a name, and what was said of it."""
+
+    at: Callable[[str, Again, int], Path]
+    told: list[str]
+
+
 NAMED_GUN = """
 from device import Identity
 from device.simulated import SimulatedGun
@@ -508,14 +515,13 @@ open_gun = NamedGun
 """
 
 
-@pytest.mark.slow
-def test_a_run_that_goes_on_on_another_gun_says_so_and_has_it_on_record(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+@pytest.fixture
+def sit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Sit:
+    """A sitting on a gun of a name, which is cut off after so many records; what it said of the gun is in `told`."""
     install(monkeypatch, tmp_path, NAMED_GUN, name="shaker", module="named_gun")
     told = list[str]()
 
-    def sit(gun: str, again: Again, records: int) -> Path:
+    def at(gun: str, again: Again, records: int) -> Path:
         def screen(*given: Any) -> Any:
             made = synthetic_screen(*given)
             made.trouble = told.append  # type: ignore[method-assign]
@@ -526,17 +532,36 @@ def test_a_run_that_goes_on_on_another_gun_says_so_and_has_it_on_record(
         journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:records]))
         return journal
 
-    sit("left", "ask", 8)
-    sit("left", "resume", 16)
-    assert told == []
-    sit("right", "resume", 24)
-    sit("right", "resume", 32)
-    journal = sit("left", "resume", 40)
+    return Sit(at=at, told=told)
+
+
+@pytest.mark.slow
+def test_a_run_that_goes_on_on_another_gun_says_so_and_has_it_on_record(sit: Sit) -> None:
+    sit.at("left", "ask", 8)
+    sit.at("left", "resume", 16)
+    assert sit.told == []
+    sit.at("right", "resume", 24)
+    sit.at("right", "resume", 32)
+    journal = sit.at("left", "resume", 40)
     names = ["shaker:left (version 2)", "shaker:right (version 2)"]
-    assert [one.partition(" from here on")[0] for one in told] == [
+    assert [one.partition(" from here on")[0] for one in sit.told] == [
         f"The gun was {was} until now, and is {now}" for was, now in (names, names[::-1])
     ]
-    assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == told
+    assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == sit.told
+
+
+@pytest.mark.slow
+def test_a_gun_on_which_nothing_was_fired_is_not_the_one_that_a_run_had(sit: Sit) -> None:
+    journal = sit.at("left", "ask", 8)
+    assert way_back_to_gun(journal, "shaker:left") == " --gun shaker:left"
+    records = [one["kind"] for one in raw(sit.at("right", "resume", 12))]
+    assert records[8:] == ["resumed", "outcome", "step", "remark"]
+    assert len(sit.told) == 1
+    back = " and --gun for the gun it had, shaker:left (version 2)"
+    assert way_back_to_gun(journal, "shaker:right") == back
+    sit.at("left", "resume", 24)
+    assert len(sit.told) == 1
+    assert way_back_to_gun(journal, "shaker:left") == " --gun shaker:left"
 
 
 @pytest.mark.parametrize("again", ["ask", "resume", "fresh"])
