@@ -932,6 +932,13 @@ def test_a_shot_that_was_refused_was_not_felt_and_one_of_unknown_outcome_may_hav
 # after the emergency stop
 
 
+def test_a_practice_after_an_emergency_stop_is_to_be_done_again_as_none_is_resumed(tmp_path: Path) -> None:
+    with sat_at(S.HALTED, tmp_path) as sitting:
+        assert by_hand(sitting, events.Fire()).text.endswith("close it, then resume it.")
+        sitting.live.plan = replace(sitting.live.plan, practice=True)
+        assert by_hand(sitting, events.Fire()).text.endswith("close it, then do it again.")
+
+
 def test_after_an_emergency_stop_a_test_shot_comes_first_for_a_key_held_a_second(tmp_path: Path) -> None:
     with sat_at(S.HALTED, tmp_path) as halted:
         halted.live.offer(events.Reason(text="the cable was loose"))

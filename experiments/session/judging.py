@@ -9,12 +9,13 @@ from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
 from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
 from experiments.session.history import History, entered_value, entries, ranks_of_others, repeatable, trial_at
-from experiments.session.states import No, Position, State, after, why_after
+from experiments.session.states import WHY_NOT, No, Position, State, after, why_after
 from experiments.session.steps import Ask, Asking, Inform, Rate, is_answer, what
 from experiments.tasks.questions import on_scale
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
+HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
 
@@ -89,7 +90,8 @@ def event_refusal(moment: Moment, event: Event, press: Press | None) -> str:
     """Why an event is not taken; empty if it is. `press`: by the experimenter's hand."""
     judged = after(moment.position, type(event), moment.now_s)
     if isinstance(judged, No):
-        return judged.because
+        halted_practice = moment.plan.practice and judged.because == WHY_NOT[State.HALTED]
+        return HALTED_PRACTICE if halted_practice else judged.because
     return _mistimed(moment, event, press) or _impossible(moment, event)
 
 
