@@ -25,7 +25,7 @@ from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
 from experiments.session.remarks import EntryCorrected, Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
-from experiments.session.steps import Interrupted, Outcome, Session, Step, step_after, step_record
+from experiments.session.steps import Answered, Asking, Interrupted, Outcome, Session, Step, step_after, step_record
 
 DISARMED_S = 10.0
 """The longest that a run waits for a disarming that began beside it: a gun on a line gives up before."""
@@ -34,6 +34,13 @@ HALT_UNSAVED = (
     "when it is resumed."
 )
 CORRECTION_UNSAVED = "a correction could not be saved: enter it anew (undo) when the run goes on"
+
+
+def _answer_unsaved(step: Asking) -> str:
+    """What is said of an answer that the disk refused."""
+    trial = step.trial
+    where = f"session {trial.session}, set {trial.set}, trial {trial.trial}"
+    return f"The answer “{step.question}” of {where} is not saved: it is to be given anew"
 
 
 class RunStopped(RecoilError):  # noqa: N818 - a stop is not an error
@@ -115,6 +122,7 @@ class LiveRun:
         self.news = threading.Condition(threading.RLock())
         self.disarming: list[threading.Thread] = []
         self.halt_unsaved = self.correction_unsaved = False
+        self._answer_unsaved = ""
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
 
@@ -261,7 +269,8 @@ class LiveRun:
     def fail(self, error: JournalError) -> NoReturn:
         """Raise what went wrong with the journal; what people did that is on no record is named with it."""
         self.journal.catch_up()
-        forgotten = [CORRECTION_UNSAVED.capitalize()] if self.correction_unsaved else []
+        forgotten = [self._answer_unsaved] if self._answer_unsaved else []
+        forgotten += [CORRECTION_UNSAVED.capitalize()] if self.correction_unsaved else []
         if self.halt_unsaved:
             forgotten += ["The emergency stop is not on record: note it; resumed, the run begins without a test shot"]
         if not forgotten:
@@ -296,7 +305,12 @@ class LiveRun:
             painted = {} if self.shown_s is None else {"shown_s": self.shown_s}
             written = self.journal.submit("outcome", body=step_record(outcome), **painted)
             self._told.append((step, outcome))
-        written.result()
+        try:
+            written.result()
+        except JournalError as error:
+            if isinstance(outcome, Answered) and isinstance(step, Asking) and not isinstance(error, JournalGone):
+                self._answer_unsaved = _answer_unsaved(step)
+            raise
         with self.news:
             self._history.append((step, outcome))
         self._screen.acknowledge(step, outcome)

@@ -26,6 +26,7 @@ from experiments.load import load_setup
 from experiments.record import storage
 from experiments.run_request import RunRequest
 from experiments.screens.console import progress, widgets
+from experiments.session.remarks import Noted
 from experiments.session.states import State
 from tests.at_controls import short_direction
 from tests.warm_start import warm
@@ -223,9 +224,9 @@ def faulty_guns(case: str) -> list[FaultyGun]:
 
 
 def window_alone() -> dict[str, Any]:
-    """A console's window without a run: in which colour it says bad news."""
+    """A console's window without a run: in which colour it says bad news, and what good ones stay below an end."""
     from experiments.screens.console.app import application
-    from experiments.screens.console.view import About
+    from experiments.screens.console.view import About, Ended, Saved
     from experiments.screens.console.window import ConsoleWindow
 
     app, setup = application(), load_setup("preference")
@@ -235,7 +236,12 @@ def window_alone() -> dict[str, Any]:
     window.say("bad news", "bad")
     app.processEvents()
     bad = window.saved.palette().color(window.saved.foregroundRole()).name()
-    return {"bad": bad, "wanted": widgets.colour("dark", "bad")}
+    below = []
+    for saved in (7, None):  # as many answers were read back at the end, or none could be
+        window.take(Saved(step=None, word=Noted(trial=plan.trials[0], text="a dog barked")))
+        window.take(Ended(reason="stopped", saved=saved))
+        below.append(window.saved.text())
+    return {"bad": bad, "wanted": widgets.colour("dark", "bad"), "below": below}
 
 
 def child(*words: object) -> dict[str, Any]:

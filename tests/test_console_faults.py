@@ -131,9 +131,10 @@ def test_a_disk_whose_sync_takes_200_ms_keeps_no_window_waiting(case: Case) -> N
     assert [(row["attempts"], row["flags"]) for row in rows] == [("1", "")] * TRIALS
 
 
-def test_bad_news_have_their_colour() -> None:
+def test_bad_news_have_their_colour_and_nothing_good_stays_below_a_run_whose_disk_failed() -> None:
     seen = child("window-alone")
     assert seen["bad"] == seen["wanted"]
+    assert seen["below"] == ["Saved. Note.", ""]
 
 
 def test_a_signal_that_comes_before_the_run_has_begun_ends_it_with_nothing_fired(case: Case) -> None:

@@ -1257,6 +1257,16 @@ def test_an_emergency_stop_that_a_failing_answer_ends_at_once_is_named_with_the_
     assert "The emergency stop is not on record" in str(sitting.error)
 
 
+def test_an_answer_that_cannot_be_written_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        monkeypatch.setattr(storage, "sync", full)
+        assert sitting.live.offer(DUE[S.ASKING])
+        sitting.finish()
+    assert isinstance(sitting.error, JournalError)
+    named = ". The answer “response” of session 1, set 1, trial 1 is not saved: it is to be given anew"
+    assert str(sitting.error).endswith(named)
+
+
 def test_an_emergency_stop_on_a_journal_that_was_moved_is_on_record_there(tmp_path: Path) -> None:
     with sat_at(S.ASKING, tmp_path) as sitting:
         journal = sitting.live.journal.path

@@ -155,6 +155,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _end(self, message: view.Ended) -> None:
         self.ended = message
+        if message.reason is not None and message.saved is None:
+            self._forget_good()
         if self.controls is not None:
             self.controls.end()
         self.close_line()
