@@ -23,7 +23,7 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import EntryCorrected, Halted, Remark, remark_kind, remark_record
+from experiments.session.remarks import OF_HALT, EntryCorrected, Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Answered, Asking, Interrupted, Outcome, Session, Step, step_after, step_record
 
@@ -362,6 +362,7 @@ class LiveRun:
         error, corrected = done.exception(), isinstance(kept[0], EntryCorrected)
         if error is None:
             self.correction_unsaved = self.correction_unsaved and not corrected
+            self.halt_unsaved = self.halt_unsaved and not isinstance(kept[0], OF_HALT)
             for remark in kept:
                 self._screen.acknowledge(None, remark)
         elif isinstance(error, JournalGone):  # it is where the journal is now

@@ -9,7 +9,7 @@ from experiments.design.plan import Trial
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
 from experiments.session.history import GrowingHistory, History, asked_before
-from experiments.session.remarks import REMARK, EntryCorrected, Halted, Remark, TestShot
+from experiments.session.remarks import OF_HALT, REMARK, EntryCorrected, Remark, TestShot
 from experiments.session.states import EMERGENCY
 from experiments.tasks.questions import AnswerValue
 
@@ -27,11 +27,11 @@ class RunPosition:
 
 
 def _halted(contents: Contents) -> bool:
-    """Whether the last word on it is an emergency stop: its record, or, where the disk took none, the stop's reason."""
+    """Whether the last word on it is an emergency stop: its record or reason, or that of the end."""
     halted = False
     for line in contents.records:
         word = _remark(contents, line) if line.kind == "remark" else None
-        if isinstance(word, Halted) or (line.kind == "stopped" and line.reason == EMERGENCY):
+        if isinstance(word, OF_HALT) or (line.kind == "stopped" and line.reason == EMERGENCY):
             halted = True
         elif isinstance(word, TestShot) and not word.cause:
             halted = False

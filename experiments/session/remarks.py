@@ -89,6 +89,10 @@ class HaltReason:
     kind: Literal["halt-reason"] = "halt-reason"
 
 
+OF_HALT = (Halted, HaltReason)
+"""Each has an emergency stop on record: of one that the disk refused, the reason that was typed for it does."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestShot:
     """A shot that nobody judged, after a key was held for so long: the gun may be armed again after an emergency stop.
