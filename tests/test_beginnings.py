@@ -234,6 +234,16 @@ def test_who_may_not_begin_is_refused_and_nothing_is_recorded(what: Entered, sai
 
 
 @pytest.mark.slow
+def test_nobody_is_excluded_while_they_sit_at_a_run(study: StudyFolder) -> None:
+    descriptor = hold_journal(broken_off(study))
+    with pytest.raises(PlaceError, match=r"P01 sits at another console, where sub-P01_task-.* is open: close it there"):
+        exclude(study.results, "P01", "fell ill", VirtualClock())
+    assert records(study) == []
+    os.close(descriptor)
+    exclude(study.results, "P01", "fell ill", VirtualClock())
+
+
+@pytest.mark.slow
 def test_who_is_excluded_may_not_go_on_until_they_are_readmitted(study: StudyFolder) -> None:
     broken_off(study)
     join(study, "P01", FACTS, VirtualClock())

@@ -225,10 +225,14 @@ def not_on_record(results: Path, participant_id: str) -> str:
 
 
 def exclude(results: Path, participant_id: str, reason: str, clock: Clock) -> None:
-    """Exclude someone; their row of the square is free again. `PlaceError` if they are not known, or excluded."""
+    """Exclude someone; their row of the square is free again.
+
+    `PlaceError` if they are not known, excluded, or at a run now. `JournalError`: a journal cannot be opened.
+    """
     before = _excluded_before(results, participant_id)
     if before is not None:
         raise PlaceError(f"participant {participant_id} is excluded already ({before}); readmit them to change that")
+    folders.refuse_open_run(results, participant_id)
     _record(results, "excluded", participant_id, reason, clock)
 
 

@@ -280,7 +280,7 @@ class _Look:
     def _progress(self, where: Place) -> RunProgress:
         if not where.journal.exists():
             return RunProgress(experiment=where.experiment, state="not begun")
-        elsewhere = _is_held(where)
+        elsewhere = _is_held(where.journal)
         data = self._data(where.journal)
         contents = journal.contents_of(where.journal, data)
         if contents is not None and contents.finished and not elsewhere and not where.table.exists():
@@ -379,11 +379,20 @@ def data_of(head: Head) -> tables.DataKind:
     return tables.data_kind(synthetic=head.participant == "synthetic", simulated=simulated)
 
 
-def _is_held(where: Place) -> bool:
+def refuse_open_run(results: Path, participant_id: str) -> None:
+    """`PlaceError` while somebody sits at a run or a practice; `JournalError`, if nobody can say."""
+    for path in sorted((results / f"sub-{participant_id}").glob("*_journal.jsonl")):
+        if _is_held(path):
+            raise PlaceError(
+                f"participant {participant_id} sits at another console, where {path.name} is open: close it there first"
+            )
+
+
+def _is_held(path: Path) -> bool:
     try:
-        return storage.is_held(where.journal)
+        return storage.is_held(path)
     except OSError as error:
-        raise JournalError(f"{where.journal}: cannot be opened ({error.strerror})") from error
+        raise JournalError(f"{path}: cannot be opened ({error.strerror})") from error
 
 
 def _missed(where: Place) -> list[bool]:
