@@ -29,8 +29,8 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.session.steps import Answered
 from experiments.study.balance import journals, unread
-from experiments.study.enrolment import not_on_record
-from experiments.study.folders import Place, PlaceError, check_code, place
+from experiments.study.enrolment import look_alike, not_on_record
+from experiments.study.folders import Place, PlaceError, check_code, known_codes, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
 
@@ -123,8 +123,11 @@ def _say_beforehand(request: RunRequest) -> None:
 
 def _not_on_record(request: RunRequest) -> Iterator[str]:
     """The start window asks by itself, and nobody is asked about synthetic people."""
-    if request.participant_id and not request.simulated:
-        yield from filter(None, [not_on_record(request.results, request.participant_id)])
+    code, results = request.participant_id, request.results
+    if code and not request.simulated:
+        if other := look_alike(code, known_codes(results, read_register(results))):
+            yield f"participant {code} is new, and {other} is there: if it is the same person, stop, and use {other}"
+        yield from filter(None, [not_on_record(results, code)])
 
 
 def _check_resumable(request: RunRequest) -> None:

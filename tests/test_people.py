@@ -116,6 +116,13 @@ def test_of_a_new_code_it_is_said_that_it_is_new_and_of_none_what_to_do() -> Non
     assert remark("", None, "direction", ORDER)[0].startswith("Who comes?")
 
 
+@pytest.mark.parametrize(("code", "known"), [("P1", "P01"), ("p01", "P01"), ("P001", "P01")])
+def test_a_new_code_that_looks_like_one_that_is_there_is_asked_about(code: str, known: str) -> None:
+    said = f"{code} is new, and {known} is there: is it the same person?"
+    assert remark(code, None, "direction", ORDER, ["P10", known]) == (said, "ask")
+    assert remark("P100", None, "direction", ORDER, ["P10", known]) == ("P100 is new.", "good")
+
+
 def test_an_exclusion_is_said_before_all_else() -> None:
     gone = someone("done", "not begun", excluded="fell ill")
     assert remark("P01", gone, "direction", ORDER) == ("P01 is excluded: fell ill.", "bad")

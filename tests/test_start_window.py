@@ -177,6 +177,9 @@ def test_a_code_that_is_typed_sets_the_first_experiment_that_they_have_not_done(
     assert experiment(window) == "direction"
     assert remark(window) == "P02 is new."
     window.form.code.clear()
+    QTest.keyClicks(window.form.code, "P1")
+    assert remark(window) == "P1 is new, and P01 is there: is it the same person?"
+    window.form.code.clear()
     QTest.keyClicks(window.form.code, "P01")
     assert experiment(window) == "preference"
 

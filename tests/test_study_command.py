@@ -356,6 +356,13 @@ def test_a_run_says_what_the_study_asks_for_and_nobody_said(recoil: Recoil, pilo
     assert "P01: not eligible: age_years = 70: must be at most 29 (rules: " in asked(pilot)
 
 
+def test_a_run_asks_about_a_new_code_that_looks_like_one_that_is_there(recoil: Recoil, pilot: Path) -> None:
+    recoil("study", "pilot", "--join", "P01", *RIGHT)
+    words = warm("run", pilot / "direction.toml", "--participant", "P1", "--results", pilot / "results")
+    with AtTerminal(words, pilot) as sitting:
+        sitting.wait_for("recoil: participant P1 is new, and P01 is there: if it is the same person, stop, and use P01")
+
+
 def test_a_run_says_nothing_of_facts_where_none_are_asked_for(pilot: Path) -> None:
     text = (pilot / "study.toml").read_text()
     (pilot / "study.toml").write_text(text[: text.index("[eligibility]")])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
@@ -111,6 +112,20 @@ def enrolment_refusal(
     if reasons:
         return f"{code} is not eligible: {'; '.join(reasons)}. Correct what was entered, or let somebody else come."
     return ""
+
+
+_LEADING_ZEROS = re.compile(r"(?<![0-9])0+(?=[0-9])")
+
+
+def look_alike(participant_id: str, known: Iterable[str]) -> str:
+    """The known code from which a new one differs by leading zeros or case alone; empty if there is none.
+
+    >>> look_alike("P1", ["P01", "P10"]), look_alike("P10", ["P01", "P1"]), look_alike("P1", ["P1", "P01"])
+    ('P01', '', '')
+    """
+    known, plain = tuple(known), _LEADING_ZEROS.sub("", participant_id).lower()
+    alike = (code for code in known if _LEADING_ZEROS.sub("", code).lower() == plain)
+    return "" if participant_id in known else next(alike, "")
 
 
 def fact_text(name: str) -> str:

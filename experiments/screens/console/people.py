@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from experiments.clock import date_text
 from experiments.screens.phrases import phrase
-from experiments.study.enrolment import left_to_do, passed_over, run_of
+from experiments.study.enrolment import left_to_do, look_alike, passed_over, run_of
 from experiments.study.folders import Overview, is_code
 from experiments.study.study import Participant, RunProgress, taking_part
 
@@ -97,8 +97,15 @@ def named_text(named: str, code: str, person: Participant | None, experiment: st
     )
 
 
-def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:
-    """What there is to know before somebody does an experiment, and a word that chooses the colour."""
+def remark(
+    code: str, person: Participant | None, experiment: str, experiments: Sequence[str], known: Sequence[str] = ()
+) -> tuple[str, str]:
+    """What there is to know before somebody does an experiment, and a word that chooses the colour.
+
+    `known`: the codes that are there.
+    """
+    if person is None and (other := look_alike(code, known)):
+        return phrase("{code} is new, and {other} is there: is it the same person?", code=code, other=other), "ask"
     return next(_remarks(code, person, experiment, experiments))
 
 

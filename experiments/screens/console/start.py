@@ -138,7 +138,8 @@ class StartWindow(QtWidgets.QWidget):
     def _show_choice(self) -> None:
         code, experiment = self.form.participant_id, self.form.experiment.currentText()
         person = self._person(code)
-        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments))
+        known = [one.participant_id for one in self._seen.participants]
+        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments, known))
         out = person is not None and person.excluded is not None
         self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
         self.shots.choose(self._setup())
