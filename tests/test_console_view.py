@@ -302,6 +302,14 @@ def test_a_run_that_stopped_says_what_is_safe_only_if_it_was_read_back() -> None
     assert unread == "The gun is gone.\nQ closes this window."
 
 
+def test_a_run_that_is_over_says_how_many_answers_count_where_a_trial_was_presented_again() -> None:
+    first, second = plan_of(DIRECTION).trials[:2]
+    told = ((ask(first), SAID), (prepare(second), Repeated(trial=first, reason="a noise")))
+    told += ((ask(first), SAID), (ask(second), SAID))
+    said = instruction(seen(DIRECTION, Position(), *told, ended=Ended(reason=None, saved=3))).detail
+    assert "3 answers, all that were given; without those before a trial was presented again: 2." in said
+
+
 def test_whose_the_keys_are_is_said_where_somebody_else_can_have_them() -> None:
     beside = ParticipantSeen(focused=True)
     assert progress.focus_text(seen(DIRECTION, Position(), participant=beside), here=False)[0].startswith(

@@ -11,10 +11,10 @@ from experiments.screens.console.keys import is_on_buttons
 from experiments.screens.console.view import Ended, Seen, method_text
 from experiments.screens.phrases import isolated, phrase
 from experiments.screens.practice_text import practice_text
-from experiments.session.history import entered_value
+from experiments.session.history import counting, entered_value
 from experiments.session.practice_rounds import is_to_be_repeated
 from experiments.session.states import State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Prepare, Present, Rate, Rest, what
+from experiments.session.steps import Answered, Ask, Asking, Describe, Inform, Prepare, Present, Rate, Rest, what
 
 DISARMING = phrase("Disarming. If the gun does not fall silent: SWITCH OFF ITS POWER.")
 """What is shown from a stop until the gun has answered."""
@@ -55,11 +55,7 @@ def _see_to_the_gun(trouble: str) -> Instruction:
 def _end(seen: Seen, ended: Ended) -> Instruction:
     about = seen.about
     kept = ended.saved if not about.band else None  # of a practice or training nothing is gone on with
-    safe = (
-        ""
-        if kept is None
-        else phrase("Read back from the disk: {answers}, all that were given. ", answers=_answers(kept))
-    )
+    safe = "" if kept is None else _read_back(seen, kept)
     close = phrase("Q closes this window.")
     if ended.reason is None:
         again = is_to_be_repeated(about.setup.config, about.plan, seen.told)
@@ -68,6 +64,19 @@ def _end(seen: Seen, ended: Ended) -> Instruction:
     resumed = "" if kept is None else phrase("{safe}The run can be resumed.", safe=safe)
     detail = "\n".join(filter(None, (_sentence(ended.reason), resumed, close)))
     return Instruction(title=phrase("Stopped"), detail=detail, mood="bad")
+
+
+def _read_back(seen: Seen, kept: int) -> str:
+    """How many answers are on the disk, and, where a trial was presented again, how many of them count."""
+    given, count = (sum(isinstance(word, Answered) for _, word in told) for told in (seen.told, counting(seen.told)))
+    if given == count:
+        return phrase("Read back from the disk: {answers}, all that were given. ", answers=_answers(kept))
+    return phrase(
+        "Read back from the disk: {answers}, all that were given; without those before a trial was presented again: "
+        "{count}. ",
+        answers=_answers(kept),
+        count=count,
+    )
 
 
 def _sentence(why: str) -> str:
