@@ -97,8 +97,8 @@ def test_a_correction_names_its_question_where_several_of_its_kind_are_asked() -
     assert instruction(seen(PREFERENCE, replace(corrected, correcting=other), *told)).title.endswith("“realism”")
 
 
-@pytest.mark.parametrize("reached", [True, False])
-def test_a_practice_in_rounds_says_at_its_end_whether_the_run_comes_next(*, reached: bool) -> None:
+def practised(*, reached: bool) -> Seen:
+    """A practice of two rounds after the first, whose answers were all right or none was."""
     rounds = {"repetitions": 1, "of": ("method", "direction"), "until_right": 0.8, "rounds": 2}
     setup = changed("direction", practice=rounds)
     plan = planning.practice_of(setup.config, "P01", 1)
@@ -106,7 +106,19 @@ def test_a_practice_in_rounds_says_at_its_end_whether_the_run_comes_next(*, reac
     said = right if reached else [{"forward": "backward"}.get(one, "forward") for one in right]
     told = tuple((ask(trial), replace(SAID, value=one)) for trial, one in zip(plan.trials, said, strict=False))
     about = About(setup=setup, plan=plan, band="PRACTICE", last="The run itself comes next.")
-    at_the_end = Seen(about=about, position=Position(states=(State.CLOSING,)), told=told)
+    return Seen(about=about, position=Position(states=(State.CLOSING,)), told=told)
+
+
+def test_a_round_of_a_practice_never_ends_early_but_its_rounds_may() -> None:
+    at_most = {one.what: (one.planned, one.at_most) for one in trials_done(practised(reached=True))}
+    assert at_most == {"set": (6, False), "session": (12, True), "experiment": (12, True)}
+    tracks = load_setup("staircase")
+    assert all(one.at_most for one in trials_done(seen(tracks, Position())))
+
+
+@pytest.mark.parametrize("reached", [True, False])
+def test_a_practice_in_rounds_says_at_its_end_whether_the_run_comes_next(*, reached: bool) -> None:
+    at_the_end = practised(reached=reached)
     for here in (at_the_end, replace(at_the_end, ended=Ended(reason=None))):
         assert ("That was not reached: explain the task again" in instruction(here).detail) is not reached
     assert ("The run itself comes next." in instruction(here).detail) is reached

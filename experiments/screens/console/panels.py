@@ -275,7 +275,7 @@ class Bars(QtWidgets.QWidget):
         """Show what is so now."""
         for bar, one in zip(self._bars, progress.trials_done(seen), strict=True):
             bar.setAccessibleName(one.what)
-            at_most = phrase("at most ") if seen.about.plan.may_end_early else ""
+            at_most = phrase("at most ") if one.at_most else ""
             bar.setFormat(phrase("{what}: %v of {at_most}%m", what=one.what, at_most=at_most))
             bar.setMaximum(one.planned)
             bar.setValue(one.count)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 
 from device import GunStatus
@@ -22,11 +22,12 @@ from experiments.session.steps import Asking, Outcome, Step
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialCount:
-    """How many trials are done of those planned, and of what."""
+    """How many trials are done of those planned, and of what; `at_most`: it may be over sooner."""
 
     what: str
     count: int
     planned: int
+    at_most: bool = False
 
 
 def trials_done(seen: Seen) -> list[TrialCount]:
@@ -34,14 +35,20 @@ def trials_done(seen: Seen) -> list[TrialCount]:
 
     Trials of the set, of the session and of the experiment; where all are rated after all were felt, felt and rated.
     """
-    design, trials, here = seen.about.setup.config, seen.about.plan.trials, seen.here
+    design, plan, here = seen.about.setup.config, seen.about.plan, seen.here
+    trials = plan.trials
     if seen.about.rated_last:
         rated = answered(seen.told, design.judged_later)
-        return [_count("felt", trials, felt(seen.told)), _count("rated", trials, rated)]
+        found = [_count("felt", trials, felt(seen.told)), _count("rated", trials, rated)]
+        return [replace(one, at_most=plan.may_end_early) for one in found]
     finished = done(seen.told, design)
     session = [trial for trial in trials if trial.session == here.session]
-    parts = {"set": seen.about.plan.set_of(here), "session": session, "experiment": trials}
-    return [_count(what, trials, finished) for what, trials in parts.items()]
+    parts = {"set": plan.set_of(here), "session": session, "experiment": trials}
+    whole = ("set",) if plan.practice else ()  # a round is always done to its end
+    return [
+        replace(_count(what, part, finished), at_most=plan.may_end_early and what not in whole)
+        for what, part in parts.items()
+    ]
 
 
 def _count(what: str, trials: Sequence[Trial], finished: Collection[Trial | None]) -> TrialCount:
