@@ -31,7 +31,7 @@ from experiments.screens.texts import ends_text, typed_rating
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Asking, Interrupted, Prepare, Present, Presented, Repeated, Rest
+from experiments.session.steps import Answered, Ask, Asking, Interrupted, Prepare, Present, Presented, Repeated, Rest
 from experiments.tasks.questions import choices_of
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
@@ -114,6 +114,18 @@ def test_a_round_of_a_practice_never_ends_early_but_its_rounds_may() -> None:
     assert at_most == {"set": (6, False), "session": (12, True), "experiment": (12, True)}
     tracks = load_setup("staircase")
     assert all(one.at_most for one in trials_done(seen(tracks, Position())))
+
+
+def test_no_further_round_comes_next_once_a_correction_in_the_break_has_reached_the_criterion() -> None:
+    rest = Rest(duration_s=30.0, between="sets")
+    missed = replace(practised(reached=False), position=Position(states=(State.RESTING,), step=rest))
+    assert len(progress.coming(missed)) == 3
+    corrected = [
+        (None, EntryCorrected(trial=step.trial, question=step.question, value=step.trial.direction))
+        for step, _ in missed.told
+        if isinstance(step, Ask)
+    ]
+    assert progress.coming(replace(missed, told=(*missed.told, *corrected))) == ["the end"]
 
 
 @pytest.mark.parametrize("reached", [True, False])

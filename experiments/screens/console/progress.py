@@ -15,6 +15,7 @@ from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
 from experiments.session.history import History, about_trials, answered, done, entries, felt, of_one_set
+from experiments.session.practice_rounds import is_needed
 from experiments.session.remarks import EntryCorrected, Flagged, Noted, Remark
 from experiments.session.states import State
 from experiments.session.steps import Asking, Outcome, Step
@@ -76,6 +77,8 @@ def _to_come(seen: Seen) -> Iterator[str]:
         here = about.plan.set_of(here)[-1]
     trials = about.plan.trials
     after = [trial for trial in trials[trials.index(here) + 1 :] if trial.track not in seen.over]
+    if resting and not is_needed(about.setup.config, about.plan, seen.told, here.set + 1):
+        after = []  # of a practice, whose score is told in a break and nowhere before
     for before, trial in pairwise([here, *after]):
         at_hand = before == here
         if not (of_one_set(before, trial) or (at_hand and (resting or later))):
@@ -83,7 +86,7 @@ def _to_come(seen: Seen) -> Iterator[str]:
         if not (at_hand and resting):  # a break that is taken now is not still to come
             yield from _break_between(about, before, trial)
         yield from _to_do(about, before, trial)
-    if after or not later:
+    if after or not (later or resting):
         yield from _asked_of_all(about)
     yield phrase("the end")
 
