@@ -16,7 +16,7 @@ from typing import NoReturn, Protocol
 
 from device import DeviceError, Gun, GunStatus
 from device.messages import RecoilError
-from experiments.clock import Clock
+from experiments.clock import Beats, Clock
 from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalError, JournalGone
 from experiments.session import events, judging
@@ -123,6 +123,7 @@ class LiveRun:
         self.disarming: list[threading.Thread] = []
         self.halt_unsaved = self.correction_unsaved = False
         self._answer_unsaved = ""
+        self.beats = Beats(clock.now)
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
 
@@ -152,6 +153,7 @@ class LiveRun:
                 painted_s=self._painted_s,
                 guard_s=self.guard_s,
                 pauses=[*self._pauses, *([] if began_s is None else [(began_s, math.inf)])],
+                alive_since_s=self.beats.alive_since_s,
                 gun_silence=self.gun_silence,
             )
 

@@ -265,6 +265,17 @@ class AtConsole(AtDisplay):
         finally:
             self.keys.key_up(key)
 
+    @contextmanager
+    def standing_still(self, seconds: float) -> Iterator[None]:
+        """The program stands still while something is done, and after it for so long."""
+        pid = self.look().pid
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            yield
+            time.sleep(seconds)
+        finally:
+            os.kill(pid, signal.SIGCONT)
+
     def click(self, name: str) -> None:
         """Click in the middle of a command's button."""
         self.keys.click(*middle(self.look(), name))

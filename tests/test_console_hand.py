@@ -152,6 +152,19 @@ def test_a_key_that_is_held_is_not_typed_into_the_field_that_opens_under_it(tmp_
         screen.hold("n", until=lambda look: look.typed.startswith("nnn"))
 
 
+def test_a_shot_that_was_asked_for_while_the_console_stood_still_is_not_fired(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.PREPARING)
+    with cell.reach() as screen:
+        with screen.standing_still(1.5):
+            screen.keys.press("space")
+        screen.until(lambda look: look.says("The console stood still as that was pressed") and look.ready)
+        assert cell.watch.calls("fired") == []
+        screen.until(lambda look: not look.says("The console stood still"))
+        screen.keys.press("space")
+        screen.at("asking")
+    assert [one["event"] for one in remarks(cell.journal, "refused")] == ["fire"]
+
+
 @needs_psychopy
 def test_on_the_participants_window_f12_halts_a_train_and_other_keys_do_nothing(tmp_path: Path, display: str) -> None:
     cell = Cell(tmp_path, display, S.TRAIN, "--participant-screen")

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from device import LimitError, LinkError
+from device.serial_gun.triggering import ARM_WITHIN_S
+from experiments.clock import STOOD_S
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
@@ -180,6 +182,55 @@ def test_a_gun_that_does_not_answer_is_not_fired_until_it_does(tmp_path: Path) -
         assert sitting.position.state is S.PREPARING
         sitting.live.gun_silence = ""
         assert by_hand(sitting, events.Fire())
+
+
+def looks(sitting: Sitting, times: int) -> None:
+    """The screen looks at its keys in time, as often as that."""
+    for _ in range(times):
+        sitting.live.beats.beat()
+        sitting.clock.skip(0.1)
+
+
+@pytest.mark.parametrize("came", ["before the screen looks again", "with one of its first looks"])
+def test_a_shot_that_was_asked_for_while_the_screen_stood_still_is_not_fired(came: str, tmp_path: Path) -> None:
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        looks(sitting, 10)
+        sitting.clock.skip(9.0)
+        looks(sitting, 0 if came.startswith("before") else 2)
+        refused = by_hand(sitting, events.Fire())
+        assert not refused
+        assert refused.text.startswith("The console stood still as that was pressed: ")
+        looks(sitting, 4)
+        assert not sitting.live.offer(
+            events.Fire(), Press(at_s=sitting.clock.now() - 5.0, serial=sitting.position.serial)
+        )
+        assert "rendered" not in sitting.gun.words
+        assert by_hand(sitting, events.Fire())
+        assert [one.event for one in remarks(of_journal(sitting), Refused)] == ["fire", "fire"]
+
+
+def test_a_standstill_as_long_as_a_gun_may_be_away_keeps_no_shot(tmp_path: Path) -> None:
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        looks(sitting, 10)
+        sitting.clock.skip(ARM_WITHIN_S / 2)
+        assert by_hand(sitting, events.Fire())
+    assert STOOD_S == ARM_WITHIN_S
+
+
+def test_what_holds_stops_or_answers_counts_however_long_the_screen_stood_still(tmp_path: Path) -> None:
+    with sat_at(S.ASKING, tmp_path) as sitting:
+        for event in (
+            events.Pause(),
+            events.GoOn(),
+            events.Answer(response="forward", at_s=0.0),
+            events.EmergencyStop(),
+        ):
+            looks(sitting, 10)
+            sitting.clock.skip(9.0)
+            assert bool(by_hand(sitting, event)) == (not isinstance(event, events.GoOn))
+            if isinstance(event, events.GoOn):
+                looks(sitting, 5)
+                assert by_hand(sitting, event)
 
 
 def test_nor_is_the_test_shot_after_an_emergency_stop(tmp_path: Path) -> None:

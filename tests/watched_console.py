@@ -7,6 +7,7 @@ the eye's file gets a line of JSON, a `Look`.
 from __future__ import annotations
 
 import json
+import os
 import sys
 import threading
 import time
@@ -96,6 +97,7 @@ class Look:
     theme: str = ""
     texts: list[str] = field(default_factory=list)
     places: dict[str, list[int]] = field(default_factory=dict)
+    pid: int = 0
 
     def says(self, words: str) -> bool:
         return any(words in text for text in self.texts)
@@ -128,7 +130,7 @@ class Eye:
         here = next(iter([*consoles, *reversed(windows)]), None)
         named = {"window": here.windowTitle(), "active": here.isActiveWindow()} if here is not None else {}
         found = self._run(consoles[0]) if consoles else {}
-        return Look(texts=texts, **named, **found)
+        return Look(texts=texts, pid=os.getpid(), **named, **found)
 
     def _kept(self, name: str, widgets: list[Any], see: Callable[[], Any]) -> Any:
         """What is seen of some widgets: anew if one of them has another text or place or is shown or hidden."""

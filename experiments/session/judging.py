@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
-from experiments.session.events import ACTS, OWN_HAND_EVENTS, Event, Press
+from experiments.session.events import ACTS, OWN_HAND_EVENTS, TO_FIRE, Event, Press
 from experiments.session.history import History, entered_value, entries, ranks_of_others, repeatable, trial_at
 from experiments.session.states import WHY_NOT, No, Position, State, after, why_after
 from experiments.session.steps import Ask, Asking, Inform, Rate, is_answer, what
@@ -25,7 +26,8 @@ class Moment:
     """All that an event is judged by.
 
     `painted_s` is when the position was on the screen; a press within `guard_s` after that is ignored; `pauses`
-    are begin and end of each; `gun_silence` is why the gun does not answer, as far as somebody looked.
+    are begin and end of each; `alive_since_s` is since when the screen has looked at its keys without standing still;
+    `gun_silence` is why the gun does not answer, as far as somebody looked.
     """
 
     plan: Plan
@@ -35,6 +37,7 @@ class Moment:
     painted_s: float | None
     guard_s: float
     pauses: Sequence[tuple[float, float]] = ()
+    alive_since_s: float = -math.inf
     gun_silence: str = ""
 
     @property
@@ -132,6 +135,8 @@ def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
         return ""
     if press.serial != moment.position.serial or moment.painted_s is None:
         return "That was pressed for what stood there before: press again."
+    if isinstance(event, TO_FIRE) and press.at_s < moment.alive_since_s:
+        return "The console stood still as that was pressed: look where the gun is, and press again."
     return "" if moment.is_ready(press.at_s) else "Too soon after the change: press again."
 
 

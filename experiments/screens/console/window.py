@@ -81,7 +81,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._build()
         self._keyboard = Keyboard(self, clock.now)
         self._timer = QTimer(self)
-        self._timer.timeout.connect(self.refresh)
+        self._timer.timeout.connect(self._beat)
         self._timer.start(REFRESH_MS)
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
@@ -246,6 +246,11 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             return frozenset()
         self._told.extend(told[len(self._told) :])  # one list that grows: each answer is taken once
         return self._tracks.over
+
+    def _beat(self) -> None:
+        if self.live is not None:
+            self.live.beats.beat()
+        self.refresh()
 
     def refresh(self) -> None:
         """Show what is so now.
