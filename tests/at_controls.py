@@ -592,8 +592,7 @@ class Sitting:
             case State.REARMING:
                 self.ready()
                 self.window.down("T")
-                self.clock.skip(1.0)
-                self.controls.tick()
+                self.look_for(1.1)
                 self.window.up("T")
             case State.TRAIN:
                 self.clock.skip(2.0)
@@ -609,6 +608,12 @@ class Sitting:
             case state:
                 self.press(_DUE[state])
         self.settle()
+
+    def look_for(self, seconds: float) -> None:
+        """Time goes by, and the window looks every 0.1 s, as it does."""
+        for _ in range(round(seconds / 0.1)):
+            self.clock.skip(0.1)
+            self.controls.tick()
 
     def finish(self) -> None:
         self._thread.join(PATIENCE_S)

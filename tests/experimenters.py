@@ -202,8 +202,7 @@ class Hand:
         controls = self.sitting.controls
         self._come("after")
         controls.hold(controls.press())
-        self.sitting.clock.skip(seconds)
-        controls.tick()
+        self.sitting.look_for(seconds)
         controls.let_go()
 
     def line(self, key: str, text: str, whole: bool) -> None:

@@ -165,6 +165,23 @@ def test_a_shot_that_was_asked_for_while_the_console_stood_still_is_not_fired(tm
     assert [one["event"] for one in remarks(cell.journal, "refused")] == ["fire"]
 
 
+def test_a_test_shot_whose_key_was_let_go_while_the_console_stood_still_is_not_fired(
+    tmp_path: Path, display: str
+) -> None:
+    cell = Cell(tmp_path, display, S.REARMING)
+    with cell.reach() as screen:
+        fired = len(cell.watch.calls("fired"))
+        screen.keys.key_down("t")
+        screen.until(lambda look: look.says("Hold it"))
+        with screen.standing_still(1.5):
+            screen.keys.key_up("t")
+        screen.until(lambda look: look.says("Let go too soon: hold it for 1 s."))
+        assert len(cell.watch.calls("fired")) == fired
+        screen.hold("t", until=lambda look: look.state != "rearming")
+    (shot,) = remarks(cell.journal, "test-shot")
+    assert 1.0 <= shot["held_s"] < 1.5
+
+
 @needs_psychopy
 def test_on_the_participants_window_f12_halts_a_train_and_other_keys_do_nothing(tmp_path: Path, display: str) -> None:
     cell = Cell(tmp_path, display, S.TRAIN, "--participant-screen")

@@ -16,6 +16,7 @@ from experiments.screens.console.keys import (
     KEY_COMMANDS,
     STRANGE_S,
     EventClock,
+    Hold,
     Name,
     Presses,
     Typing,
@@ -323,6 +324,13 @@ def test_a_stamp_whose_zero_has_jumped_is_not_believed(jump_s: int) -> None:
     clock.at(4_294_967_000, 100.0)  # X counts milliseconds in 32 bits: after 49.7 days it begins anew
     assert clock.at(4_294_967_000 - 1000 * jump_s, 101.0) == 101.0
     assert STRANGE_S == 2.0
+
+
+def test_a_key_that_nobody_looked_at_for_a_while_is_held_anew() -> None:
+    hold = Hold(10.0)
+    assert [hold.held_s(at_s) for at_s in (10.1, 10.25, 10.5)] == pytest.approx([0.1, 0.25, 0.5])
+    assert hold.held_s(13.5) == 0.0  # stopped, starved or swapped out: it may have been let go
+    assert hold.held_s(13.6) == pytest.approx(0.1)
 
 
 def test_a_key_that_is_held_is_not_let_go_by_repeats_that_come_as_releases_and_presses_apart() -> None:

@@ -102,7 +102,7 @@ class Controls:
         self._choices, self._hand, self._participant = choices, hand, participant
         self._synthetic, self._kept = synthetic, kept
         self._open: tuple[keys.Name, Trial] | None = None
-        self._held: Press | None = None
+        self._held: tuple[Press, keys.Hold] | None = None
         self.drawn = live.position
         self.page: keys.Name | None = None
         self.ended = False
@@ -160,7 +160,7 @@ class Controls:
         if self.page:
             self._run_again()
         elif self.drawn.state is State.REARMING and self._held is None:
-            self._held = press
+            self._held = press, keys.Hold(self._clock.now())
             self._view.say(phrase("Hold it …"), "wait")
 
     def let_go(self) -> None:
@@ -173,8 +173,8 @@ class Controls:
         """Look whether it was held for long enough, and whether a line or a page takes what is typed `here`."""
         if self._participant is not None:
             self._participant.covered = here and self.covered
-        press = self._held
-        if press is not None and (held_s := self._clock.now() - press.at_s) >= REARM_HELD_S:
+        press, hold = self._held or (None, None)
+        if hold is not None and (held_s := hold.held_s(self._clock.now())) >= REARM_HELD_S:
             self._held = None
             self._offer(events.Rearm(held_s=held_s), press)
 

@@ -331,6 +331,24 @@ def why_not(name: Name, position: Position) -> str:
     return change.because if isinstance(change, No) else ""
 
 
+LOOKED_S = 0.3
+"""A key that nobody looked at for longer may have been let go meanwhile."""
+
+
+class Hold:
+    """For how long a key is held: after a while in which nobody looked it begins anew."""
+
+    def __init__(self, now_s: float) -> None:
+        self._from_s = self._seen_s = now_s
+
+    def held_s(self, now_s: float) -> float:
+        """For how long, as somebody looks now."""
+        if now_s - self._seen_s > LOOKED_S:
+            self._from_s = now_s
+        self._seen_s = now_s
+        return now_s - self._from_s
+
+
 class Presses:
     """Which keys are down, so that a press acts once."""
 
