@@ -36,7 +36,7 @@ from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out
 from experiments.session.design_session import design_session
 from experiments.session.history import GrowingHistory
-from experiments.session.remarks import Noted
+from experiments.session.remarks import HALTED_BEFORE, Noted
 from experiments.session.steps import Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
@@ -272,6 +272,14 @@ def _resume(
     return replay.go_on(session, before, position, journal.append)
 
 
+def _halted_before(position: RunPosition, place: Place, live: LiveRun) -> RunPosition:
+    """Where a run stands; what its participant did before it may owe it a test shot too, which is noted."""
+    if position.halted or not folders.begins_halted(place):
+        return position
+    live.remark(Noted(trial=None, text=HALTED_BEFORE))
+    return replace(position, halted=True)
+
+
 def _to_the_end(
     session: Session, desk: Desk, position: RunPosition, place: Place, settle: Callable[[], None] | None
 ) -> int:
@@ -282,7 +290,7 @@ def _to_the_end(
     """
     try:
         try:
-            carry_out(session, desk, position)
+            carry_out(session, desk, _halted_before(position, place, desk.live))
         finally:
             if settle is not None:
                 settle()

@@ -15,6 +15,7 @@ import pytest
 from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, SHORT_TRIALS, answers, rows, shorten, words
 from tests.warm_start import warm
+from tests.watched_console import Watch
 
 pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
@@ -100,6 +101,32 @@ def test_a_training_leaves_nothing_behind(quick_configs: Path, tmp_path: Path, d
         code, said = close_the_day(screen)
     assert code == 0, said
     assert not list(tmp_path.glob("results/sub-*"))
+
+
+@pytest.mark.parametrize("practises", [True, False], ids=["practice", "run"])
+def test_after_an_emergency_stop_in_a_practice_the_next_one_and_the_run_begin_with_a_test_shot(
+    quick_configs: Path, tmp_path: Path, display: str, practises: bool
+) -> None:
+    watch = Watch(str(tmp_path))
+    practice = words(quick_configs, "direction", "--participant", "P01", "--practice")
+    with AtConsole(practice, tmp_path, display, watch) as screen:
+        screen.stands(RUN)
+        screen.to("preparing")
+        screen.keys.press("F12")
+        screen.at("halted")
+        screen.keys.press("q")
+        screen.close()
+    again = practice if practises else practice[:-1]
+    with AtConsole(again, tmp_path, display, watch) as screen:
+        screen.stands(RUN)
+        screen.at("rearming")
+        assert screen.look().says("Stand clear.")
+        screen.keys.press("space")
+        screen.until(lambda look: look.says("After an emergency stop a test shot comes first."))
+        assert watch.calls("fired") == []
+        screen.to("preparing")
+        assert len(watch.calls("fired")) == 1
+        screen.stop()
 
 
 @pytest.mark.parametrize(("key", "kept"), [("g", 2), ("n", 0)])

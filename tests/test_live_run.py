@@ -28,6 +28,7 @@ from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
 from experiments.session.remarks import (
+    HALTED_BEFORE,
     EntryCorrected,
     Flagged,
     Halted,
@@ -1056,6 +1057,41 @@ def test_the_test_shot_is_owed_also_if_the_process_died(resumed: bool, tmp_path:
 def wait_for_the_disk(sitting: Sitting) -> None:
     """Wait until what was written is on the disk."""
     sitting.live.journal.append("remark", body={"kind": "noted", "trial": None, "text": "now"})
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "direction_journal.aside-1",
+        "direction_practice_journal",
+        "direction_practice_journal.aside-2",
+        "preference_journal",
+    ],
+)
+def test_what_a_participant_does_after_an_emergency_stop_begins_with_a_test_shot(name: str, tmp_path: Path) -> None:
+    with sat_at(S.HALTED, tmp_path) as sitting:
+        sitting.press("Q")
+    journal = place(tmp_path, "P01", "direction").journal
+    journal.rename(journal.with_name(f"sub-P01_task-{name}.jsonl"))
+    with sat(DIRECTION, tmp_path) as sitting:  # it ends before the test shot
+        assert sitting.state is S.REARMING
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        assert sitting.state is S.REARMING
+        sitting.clock.skip(3600.0)
+        sitting.to(S.PREPARING)
+        assert sitting.gun.words.count("rendered") == 1
+        assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * 2
+    journal.rename(journal.with_name("sub-P01_task-direction_journal.aside-3.jsonl"))
+    with sat(DIRECTION, tmp_path) as sitting:  # a test shot is the last word by now
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+
+
+def test_a_journal_that_cannot_be_read_is_in_the_way_of_no_other_run(tmp_path: Path) -> None:
+    beside = place(tmp_path, "P01", "preference").journal
+    beside.parent.mkdir(parents=True)
+    beside.write_bytes(b"{}\n")
+    with sat(DIRECTION, tmp_path) as sitting:
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
 
 
 def test_an_emergency_stop_during_the_test_shot_owes_another_one(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,11 +24,12 @@ from PyQt6.QtWidgets import QApplication, QPushButton, QScrollArea, QWidget
 
 from experiments.catalogues.catalogue import ENGLISH, language
 from experiments.clock import RealClock, VirtualClock
+from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
 from experiments.run import run
 from experiments.run_request import ParticipantOptions, RunRequest
-from experiments.screens.console import widgets
+from experiments.screens.console import live, widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening
 from experiments.screens.console.live import study_of
@@ -267,6 +269,28 @@ def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_t
     first, second = said(opened(said="P02 stopped: emergency stop.")).splitlines()
     assert first == "P02 stopped: emergency stop."
     assert "line 1: not a JSON record" in second
+
+
+@pytest.mark.parametrize("practice", [True, False])
+@pytest.mark.parametrize(("reason", "owed"), [("emergency stop", True), ("enough", False)])
+def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_first(
+    practice: bool, reason: str, owed: bool, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results, practice=practice)
+    choices, told = [request, None], list[str]()
+
+    def choose(_: StudyFolder, opening: Opening, __: object) -> RunRequest | None:
+        told.append(opening.said)
+        return choices.pop(0)
+
+    def stops(*_: object, **__: object) -> None:
+        raise RunStopped(reason)
+
+    monkeypatch.setattr(live, "choose_run", choose)
+    monkeypatch.setattr(live, "run_live", stops)
+    live.lab_day(request, (), lambda *_: nullcontext())
+    assert f"P01 stopped: {reason}." in told[1]
+    assert told[1].endswith("Whatever they do next begins with a test shot.") is owed
 
 
 # starting

@@ -21,6 +21,7 @@ from device.messages import RecoilError
 from experiments.record import storage, tail
 from experiments.record.journal import JournalError
 from experiments.record.tail import JournalTail
+from experiments.session.remarks import HALTED_BEFORE
 from experiments.watch import server as serving
 from experiments.watch.folder import FolderWatch, Reader, Watched, watched_folder
 from experiments.watch.page import PAGE_PARTS, page_parts, whole_page
@@ -121,6 +122,7 @@ def test_a_run_is_shown_with_its_place_and_what_is_awaited_and_without_any_answe
         ([{"kind": "paused", "cause": "the keys are gone"}], "paused", 1),
         ([{"kind": "paused"}, {"kind": "continued", "paused_s": 3.0}], "running", 0),
         ([{"kind": "halted", "by": "participant"}], "emergency stop", 1),
+        ([{"kind": "noted", "trial": None, "text": HALTED_BEFORE}], "emergency stop", 0),
     ],
 )
 def test_a_pause_and_an_emergency_stop_are_told(

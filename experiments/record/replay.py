@@ -18,7 +18,8 @@ from experiments.tasks.questions import AnswerValue
 class RunPosition:
     """Where a run stands: its next step, `None` at the end, and what was done before, which the session reads.
 
-    `halted`: an emergency stop ended it, and no test shot was fired since; one must come before anything else.
+    `halted`: an emergency stop ended it, or what came before it, and no test shot was fired since; one must come before
+    anything else.
     """
 
     step: steps.Step | None
@@ -26,16 +27,19 @@ class RunPosition:
     halted: bool = False
 
 
-def _halted(contents: Contents) -> bool:
-    """Whether the last word on it is an emergency stop: its record or reason, or that of the end."""
-    halted = False
+def last_word_on_gun(contents: Contents) -> tuple[str, bool]:
+    """When an emergency stop or a test shot after one is on record last, and whether it is the stop; "" if none is.
+
+    The stop is its record, its reason or, where the disk took neither, why the run stopped.
+    """
+    last = "", False
     for line in contents.records:
         word = _remark(contents, line) if line.kind == "remark" else None
         if isinstance(word, OF_HALT) or (line.kind == "stopped" and line.reason == EMERGENCY):
-            halted = True
+            last = line.utc, True
         elif isinstance(word, TestShot) and not word.cause:
-            halted = False
-    return halted
+            last = line.utc, False
+    return last
 
 
 def history(contents: Contents) -> History:
@@ -105,7 +109,7 @@ def replay(session: steps.Session, contents: Contents, told: GrowingHistory | No
         step, sent = _caught_up(session, step, told, sent)
         _compare(contents, number, step, recorded)
     step, _ = _caught_up(session, step, told, sent)
-    return RunPosition(step=step, history=told, halted=_halted(contents))
+    return RunPosition(step=step, history=told, halted=last_word_on_gun(contents)[1])
 
 
 def _caught_up(

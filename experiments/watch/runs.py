@@ -197,6 +197,8 @@ class RunSoFar:
                 self._offer(events.GoOn, record)
             case remarks.Halted():
                 self._offer(events.EmergencyStop, record)
+            case remarks.Noted(text=remarks.HALTED_BEFORE):
+                self._position = Position(states=(State.REARMING,))
             case remarks.TestShot(cause=""):
                 self._position = Position()
 

@@ -39,6 +39,7 @@ from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, Question
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
+from experiments.session.states import EMERGENCY
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 
@@ -159,6 +160,11 @@ def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
 def _stopped(choice: RunRequest, reason: str) -> str:
     if choice.training:
         return phrase("The training stopped: {reason}.", reason=reason)
+    halted = phrase("Whatever they do next begins with a test shot.") if reason.startswith(EMERGENCY) else ""
+    return " ".join(filter(None, (_stopped_at(choice, reason), halted)))
+
+
+def _stopped_at(choice: RunRequest, reason: str) -> str:
     if choice.practice:
         return phrase(
             "The practice of {participant_id} stopped: {reason}. It can be done again.",
