@@ -33,7 +33,7 @@ from experiments.screens.console import live, widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening
 from experiments.screens.console.live import study_of
-from experiments.screens.console.start import StartWindow
+from experiments.screens.console.start import NOTHING_ARMED, StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
 from experiments.study.folders import StudyFolder, open_study, place
@@ -291,6 +291,12 @@ def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_fir
     live.lab_day(request, (), lambda *_: nullcontext())
     assert f"P01 stopped: {reason}." in told[1]
     assert told[1].endswith("Whatever they do next begins with a test shot.") is owed
+
+
+def test_f12_is_said_to_be_heard_where_nothing_is_armed(opened: Open) -> None:
+    window = opened()
+    key(window, "F12")
+    assert said(window) == NOTHING_ARMED
 
 
 # starting

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import QEventLoop, pyqtSignal
-from PyQt6.QtGui import QCloseEvent, QResizeEvent
+from PyQt6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 
 from experiments.clock import Clock
 from experiments.config.setup import Setup
@@ -24,6 +24,7 @@ from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
 SIMULATED = "simulated"
+NOTHING_ARMED = phrase("F12 is heard. Nothing is armed here: it stops test shots, practices and runs.")
 STOPPED = phrase("The last test shot ended by an emergency stop.")
 
 
@@ -91,6 +92,7 @@ class StartWindow(QtWidgets.QWidget):
         grid.addWidget(button(phrase("Quit"), "Ctrl+Q", self.close), 0, 4, 2, 1)
         for column, stretch in enumerate((3, 2, 2, 2, 1)):
             grid.setColumnStretch(column, stretch)
+        QShortcut(QKeySequence("F12"), page).activated.connect(lambda: self.say(NOTHING_ARMED, "ask"))
         return grid
 
     def _connect(self) -> None:
