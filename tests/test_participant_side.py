@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -13,11 +15,13 @@ import pytest
 
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages, translated
 from experiments.design.plan import Trial, condition
+from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
-from experiments.screens.console.view import Message, ParticipantSeen
+from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.messages import BETWEEN, Focused, NoiseEnded, NoiseIs, line
+from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
 from tests.asked import describe, rate
@@ -140,16 +144,45 @@ def test_noise_that_ended_before_anybody_listened_is_said_once_the_run_begins(tm
     word = line(NoiseEnded(message="Masking noise has ended")).decode().strip()
     program = f"import sys, time; print({word!r}, flush=True); sys.stdin.read()"
     link = ParticipantLink.start(command=(sys.executable, "-c", program))
-    playing = NoiseIs(on=True, message="")
-    side = ParticipantSide(link, lambda: link, SETUP, rates=True, own_keys=False, noise=playing)
     told: list[Message] = []
     try:
         wait_for(lambda: link.noise_ended)
         with sat(SETUP, tmp_path) as sitting:
-            assert side.begin(sitting.live, told.append) == "Masking noise has ended"
+            beside(link).begin(sitting.live, told.append)
+            assert notes(sitting.live) == ["Masking noise plays.", "Masking noise has ended"]
     finally:
         link.close()
     assert [one.noise_off for one in told if isinstance(one, ParticipantSeen)][-1]
+    assert [one.text for one in told if isinstance(one, Trouble)] == ["Masking noise has ended"]
+
+
+def test_noise_that_goes_with_the_participants_screen_is_said_shown_and_on_record(tmp_path: Path) -> None:
+    link = ParticipantLink.start(command=(sys.executable, "-c", "import sys; sys.stdin.read()"))
+    told: list[Message] = []
+    try:
+        with sat(SETUP, tmp_path) as sitting:
+            beside(link).begin(sitting.live, told.append)
+            assert not [one for one in told if isinstance(one, ParticipantSeen)][-1].noise_off
+            os.kill(link.pid, signal.SIGKILL)
+            wait_for(lambda: len(notes(sitting.live)) > 1)
+            ended = "Masking noise has ended with the participant's screen, and begins again with it."
+            assert notes(sitting.live) == ["Masking noise plays.", ended]
+            assert sitting.live.position.state is State.PAUSED
+    finally:
+        link.close()
+    assert [one for one in told if isinstance(one, ParticipantSeen)][-1].noise_off
+    assert [one.text for one in told if isinstance(one, Trouble)] == [ended]
+
+
+def beside(link: ParticipantLink) -> ParticipantSide:
+    """A participant's screen with noise that plays."""
+    playing = NoiseIs(on=True, message="")
+    return ParticipantSide(link, lambda: link, SETUP, rates=True, own_keys=False, noise=playing)
+
+
+def notes(live: LiveRun) -> list[str]:
+    """What the record has of its own accord."""
+    return [word.text for _, word in live.history if isinstance(word, Noted)]
 
 
 def test_the_program_is_started_again_once_however_often_it_is_asked_for(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ from experiments.screens.console.windows import (
 from experiments.screens.display import no_display
 from experiments.session import events
 from experiments.session.events import Hand
-from experiments.session.remarks import Noted, Remark
+from experiments.session.remarks import Remark
 from experiments.session.states import Position
 from experiments.session.steps import Outcome, Step
 from experiments.study.folders import PlaceError
@@ -249,9 +249,7 @@ class Console:
         if self._leaving:
             live.offer(events.Stop(reason=self._leaving))
         if self.participant is not None:
-            noise = self.participant.begin(live, self._tell)
-            if noise:
-                live.remark(Noted(trial=None, text=noise))
+            self.participant.begin(live, self._tell)
         threading.Thread(target=self._look_at, args=(live,), daemon=True, name="gun-look").start()
 
     def show(self, position: Position) -> None:

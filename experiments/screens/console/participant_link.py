@@ -141,14 +141,13 @@ class ParticipantSide:
         self.covered = False
         """Whether a line or a page of the console takes what is typed: the participant's keys are not told from it."""
 
-    def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> str:
-        """Take the place beside a console. Gives back what the record is to say of the noise, if anything."""
+    def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> None:
+        """Take the place beside a console."""
         self._live, self._tell, self.planned = live, tell, len(live.plan.trials)
+        if self._noise is not None:
+            self._noise_is(self._noise)
         self._link.listen(self._heard, self._gone)
-        if self._noise is not None and self._link.noise_ended is not None:  # before anybody listened
-            self._noise = messages.NoiseIs(on=False, message=self._link.noise_ended.message)
         self._see()
-        return self._noise_told()
 
     def _see(self) -> None:
         """Tell the console how the participant's screen stands."""
@@ -157,14 +156,19 @@ class ParticipantSide:
         noise_off = self._noise is not None and not self._noise.on
         self._tell(ParticipantSeen(focused=has_keys, failure=failure, noise_off=noise_off))
 
-    def _noise_told(self) -> str:
-        """What the record is to say of the noise, if anything; the console hears that it stays off."""
-        if self._noise is None:
-            return ""
-        if not self._noise.on:
-            self._tell(Trouble(text=self._noise.message))
-            return self._noise.message
-        return phrase("Masking noise plays.")
+    def _noise_is(self, noise: messages.NoiseIs) -> None:
+        """How the noise stands from now on: seen and on record, and said if it is off."""
+        self._noise = noise
+        self._see()
+        if not noise.on:
+            self._tell(Trouble(text=noise.message))
+        if self._live is not None:
+            self._live.remark(Noted(trial=None, text=noise.message or phrase("Masking noise plays.")))
+
+    def _noise_ends(self, why: str) -> None:
+        """Noise plays no more, if it did."""
+        if self._noise is not None and self._noise.on:
+            self._noise_is(messages.NoiseIs(on=False, message=why))
 
     @property
     def asking(self) -> bool:
@@ -313,10 +317,8 @@ class ParticipantSide:
                 self._offer(events.EmergencyStop(by="participant"))
             case messages.Focused():
                 self._see()
-            case messages.NoiseEnded() if self._live is not None:
-                self._noise = messages.NoiseIs(on=False, message=word.message)
-                self._see()
-                self._live.remark(Noted(trial=None, text=self._noise_told()))
+            case messages.NoiseEnded():
+                self._noise_ends(word.message)
             case messages.KeyPressed() if self._live is not None:
                 position, now_s = self._live.position, self._live.clock.now()
                 said = self._said(position)
@@ -329,6 +331,7 @@ class ParticipantSide:
         if not self._closed:
             self._see()
             self._offer(events.ParticipantLost(cause=cause))
+            self._noise_ends(phrase("Masking noise has ended with the participant's screen, and begins again with it."))
 
     @property
     def lost(self) -> bool:
@@ -357,11 +360,8 @@ class ParticipantSide:
         self._tell(Trouble(text=phrase("The participant's screen is there again."), mood="good"))
         self._offer(events.ParticipantBack())
         if self._noise is not None:
-            self._noise = noise_of(link)  # that of the program before ended with it
-            self._see()
+            self._noise_is(noise_of(link))
         if self._live is not None:
-            if noise := self._noise_told():
-                self._live.remark(Noted(trial=None, text=noise))
             self.follow(self._live.position)
 
     def close(self) -> None:

@@ -135,8 +135,9 @@ class ParticipantLink:
     def listen(self, heard: Callable[[messages.Unasked], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
-        if self.focused is not None:
-            heard(self.focused)
+        for word in (self.focused, self.noise_ended):
+            if word is not None:
+                heard(word)
         if self.failure is not None:
             gone(self.failure)
 
