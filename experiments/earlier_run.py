@@ -197,6 +197,11 @@ UNMEASURED = (
     "are to be, stop, and resume with the sensor."
 )
 
+UNMASKED = (
+    "Masking noise was asked for in this run until now, and is not any more: from here on the participant hears the "
+    "room. If it is to play, stop, and resume with the noise."
+)
+
 
 def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iterator[str]:
     """What is not as it was until a run broke off, and does not forbid to go on: it is said, and noted in the run."""
@@ -204,6 +209,9 @@ def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iter
         return
     if not request.sensor and any(record.kind == "measured" for record in before.records):
         yield UNMEASURED
+    began = next((record for record in reversed(before.records) if record.gun is not None), before.head)
+    if began.noise and not request.options.noise:
+        yield UNMASKED
     was, now = gun_felt_last(before), gun.identify()
     if was is not None and was != now:
         yield (

@@ -239,6 +239,7 @@ def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, obj
         "gun": asdict(gun.identify()),
         "clock": clock.name,
         **({"sensor": request.sensor} if request.sensor else {}),
+        **({"noise": True} if request.options.noise else {}),
         "experimenter_knows": ["direction", *dampers, *by_hand(setup.config), *_shown_levels(setup.config)],
         **({"preregistration_sha256": frozen} if frozen else {}),
     }

@@ -17,12 +17,12 @@ from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
-from experiments.earlier_run import NotAsItBegan, earlier_run, way_back_to_gun
+from experiments.earlier_run import UNMASKED, NotAsItBegan, earlier_run, way_back_to_gun
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.record.replay import go_on, history, replay
 from experiments.run import run
-from experiments.run_request import Again, RunRequest
+from experiments.run_request import Again, ParticipantOptions, RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.design_session import design_session
 from experiments.session.states import EMERGENCY
@@ -515,6 +515,36 @@ open_gun = NamedGun
 """
 
 
+def sat(asked: RunRequest, records: int, told: list[str]) -> Path:
+    """A run that was broken off after so many records, and what its screen was told."""
+
+    def screen(*given: Any) -> Any:
+        made = synthetic_screen(*given)
+        made.trouble = told.append  # type: ignore[method-assign]
+        return made
+
+    journal = run(asked, screen, VirtualClock()).place.journal
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:records]))
+    return journal
+
+
+@pytest.mark.slow
+def test_a_run_that_had_masking_noise_and_goes_on_without_says_so_once_and_has_it_on_record(tmp_path: Path) -> None:
+    told = list[str]()
+
+    def sit(again: Again, records: int, *, noise: bool) -> Path:
+        asked = replace(request("direction", tmp_path, again), options=ParticipantOptions(noise=noise))
+        return sat(asked, records, told)
+
+    sit("ask", 8, noise=True)
+    sit("resume", 16, noise=True)
+    assert told == []
+    sit("resume", 24, noise=False)
+    journal = sit("resume", 32, noise=False)
+    assert told == [UNMASKED]
+    assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == told
+
+
 @pytest.fixture
 def sit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Sit:
     """A sitting on a gun of a name, which is cut off after so many records; what it said of the gun is in `told`."""
@@ -522,15 +552,8 @@ def sit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Sit:
     told = list[str]()
 
     def at(gun: str, again: Again, records: int) -> Path:
-        def screen(*given: Any) -> Any:
-            made = synthetic_screen(*given)
-            made.trouble = told.append  # type: ignore[method-assign]
-            return made
-
         asked = replace(request("direction", tmp_path / "results", again), gun=f"shaker:{gun}")
-        journal = run(asked, screen, VirtualClock()).place.journal
-        journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:records]))
-        return journal
+        return sat(asked, records, told)
 
     return Sit(at=at, told=told)
 
