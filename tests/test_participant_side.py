@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
 from tests.asked import describe, rate
-from tests.at_controls import sat
+from tests.at_controls import PREFERENCE, sat
 from tests.waiting import PATIENCE_S, wait_for
 
 SETUP = load_setup("preference")
@@ -140,6 +140,7 @@ def test_whose_the_keys_are_is_told_also_if_it_was_said_before_anybody_listened(
     assert heard == [Focused(on=True)]
 
 
+@pytest.mark.slow
 def test_noise_that_ended_before_anybody_listened_is_said_once_the_run_begins(tmp_path: Path) -> None:
     word = line(NoiseEnded(message="Masking noise has ended")).decode().strip()
     program = f"import sys, time; print({word!r}, flush=True); sys.stdin.read()"
@@ -174,10 +175,49 @@ def test_noise_that_goes_with_the_participants_screen_is_said_shown_and_on_recor
     assert [one.text for one in told if isinstance(one, Trouble)] == [ended]
 
 
-def beside(link: ParticipantLink) -> ParticipantSide:
+@pytest.mark.slow
+def test_noise_begins_again_with_the_participants_screen_also_if_the_run_has_gone_on_to_a_question(
+    tmp_path: Path,
+) -> None:
+    first = ParticipantLink.start(command=(sys.executable, "-c", "import sys; sys.stdin.read()"))
+    again, go = ParticipantLink.start(command=(sys.executable, "-c", PLAYS)), threading.Event()
+    side = beside(first, lambda: again if go.wait(PATIENCE_S) else first)
+    try:
+        with sat(PREFERENCE, tmp_path) as sitting:
+
+            def tell(message: Message) -> None:
+                if isinstance(message, Trouble) and "there again" in message.text:
+                    side.follow(sitting.position)  # as the console does at any moment
+                    wait_for(lambda: again.asking)
+
+            sitting.to(State.RATING)
+            side.begin(sitting.live, tell)
+            os.kill(first.pid, signal.SIGKILL)
+            wait_for(lambda: sitting.state is State.PAUSED)
+            side.restart()
+            sitting.press("P")
+            go.set()
+            wait_for(lambda: len(notes(sitting.live)) > 3)
+            assert notes(sitting.live)[2:] == ["Masking noise plays.", "The participant's screen was started again."]
+    finally:
+        first.close()
+        again.close()
+
+
+PLAYS = """
+import json, sys
+for line in sys.stdin:
+    word = json.loads(line)
+    if word["kind"] == "noise":
+        print(json.dumps({"kind": "noise-is", "on": True, "message": "", "ask": word["ask"]}), flush=True)
+"""
+"""A participant's program that plays noise and answers nothing."""
+
+
+def beside(link: ParticipantLink, again: Callable[[], ParticipantLink] | None = None) -> ParticipantSide:
     """A participant's screen with noise that plays."""
     playing = NoiseIs(on=True, message="")
-    return ParticipantSide(link, lambda: link, SETUP, rates=True, own_keys=False, noise=playing)
+    return ParticipantSide(link, again or (lambda: link), SETUP, rates=True, own_keys=False, noise=playing)
 
 
 def notes(live: LiveRun) -> list[str]:

@@ -353,14 +353,15 @@ class ParticipantSide:
         except ParticipantError as error:
             self._offer(events.Stop(reason=f"the participant's screen did not start again: {error}"))
             return
+        noise = None if self._noise is None else noise_of(link)  # before the run, which may go on, asks anything there
         with self._lock:
             self._link, self._shows, self._starting = link, "", False
+        self._tell(Trouble(text=phrase("The participant's screen is there again."), mood="good"))
+        if noise is not None:
+            self._noise_is(noise)
         self._see()
         link.listen(self._heard, self._gone)
-        self._tell(Trouble(text=phrase("The participant's screen is there again."), mood="good"))
         self._offer(events.ParticipantBack())
-        if self._noise is not None:
-            self._noise_is(noise_of(link))
         if self._live is not None:
             self.follow(self._live.position)
 
