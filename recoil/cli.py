@@ -9,7 +9,6 @@ import re
 import signal
 import sys
 import threading
-import time
 from _thread import interrupt_main
 from collections.abc import Sequence
 from copy import copy
@@ -21,6 +20,7 @@ import recoil
 from analysis.report.streams import forgive_streams, keep_results_apart
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.interrupts import INTERRUPTS
+from device.machine_clock import machine_s
 from device.messages import RecoilError, few_of_each
 from recoil.commands import archives, guns, numbers, predictions, sessions
 
@@ -171,7 +171,7 @@ def _interrupt(number: int, _: object) -> None:
 
     What comes at once after it cuts short no clearing up.
     """
-    now_s = time.monotonic()
+    now_s = machine_s()
     if now_s - _RAISED_S[0] < _AT_ONCE_S:
         return
     _RAISED_S[0] = now_s
