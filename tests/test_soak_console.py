@@ -250,7 +250,7 @@ def test_f12_while_every_sync_is_slow(tmp_path: Path, display: str, soak: Soak) 
     configs, late_s, after_latch, fired = short_configs(tmp_path), [0.0], 0, 0
     with AtConsole(words(configs, "direction", "--fresh"), tmp_path, display, watch) as screen:
         for _ in range(STOPS):
-            screen.until(lambda look: look.state in ("setting", "preparing"))
+            screen.until(lambda look: look.state in ("rearming", "setting", "preparing"))
             screen.stands("Recoil – P01")
             screen.to("preparing")
             screen.keys.press("space")
@@ -320,7 +320,7 @@ def key_to_wire_ms(folder: Path, display: str, stops: int) -> list[float]:
         run = words(short_configs(folder), "preference", "--gun", gun, "--fresh")
         with AtConsole(run, folder, display, watch) as screen:
             for _ in range(stops):
-                screen.until(lambda look: look.state in ("setting", "preparing"))
+                screen.until(lambda look: look.state in ("rearming", "setting", "preparing"))
                 screen.stands("Recoil – P01")
                 screen.to("train")
                 pressed_s = screen.keys.press("F12")
