@@ -107,6 +107,16 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     return Bench(monkeypatch)
 
 
+def test_a_countdown_in_which_the_console_stood_still_fires_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, stood_s = Bench(monkeypatch, countdown_s=1), [0.0]
+    now = bench.clock.now
+    monkeypatch.setattr(bench.clock, "now", lambda: now() + stood_s[0])
+    bench.at["counting"] = lambda: stood_s.__setitem__(0, 9.0)
+    over = bench.carry_out()
+    assert over.text == "The console stood still in the countdown: nothing was fired. The gun reports: disarmed."
+    assert (over.fired, bench.words) == (False, ["disarm", "status", "close"])
+
+
 # as the run drives it
 
 
