@@ -351,7 +351,7 @@ def carry_out(folder: Path, sizes: list[tuple[int, int]]) -> dict[str, list[str]
             ("preference", Turns.rearming, "resume"),
             ("many answers", Turns.many_answers, "fresh"),
         ):
-            one_run(experiment, Path(results), again, Turns(guns), turns, look)
+            one_run(experiment, Path(results) / experiment, again, Turns(guns), turns, look)
     return found
 
 
