@@ -223,6 +223,11 @@ class AtConsole(AtDisplay):
         """The pages that were shown to the participant."""
         return watched_participant.pages(self.watch.pages)
 
+    @property
+    def participant_pid(self) -> int:
+        """The process of the participant's program that was started last, and not what stands in its stead."""
+        return watched_participant.pid(self.watch.pages)
+
     def due(self, look: Look) -> None:
         """Press what is due at a state."""
         keys = {

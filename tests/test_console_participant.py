@@ -216,6 +216,32 @@ def a_key_goes_into_a_note_and_a_page(screen: AtConsole, journal: Path, shown: i
         screen.participant_shows("ChoicePage", count)
 
 
+def test_a_time_that_is_lost_is_said_until_the_next_trial_is_answered(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    lost = "The participant’s screen stood still for"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=1)
+        screen.participant_shows("ChoicePage")
+        os.kill(screen.participant_pid, signal.SIGSTOP)
+        screen.keys.press("Up")
+        time.sleep(0.5)
+        os.kill(screen.participant_pid, signal.SIGCONT)
+        screen.until(lambda look: look.state != "asking" and look.says(lost))
+        screen.to("asking", trial=2)
+        assert screen.look().says(lost)
+        screen.participant_shows("ChoicePage", 2)
+        screen.keys.press("Down")
+        screen.until(lambda look: look.says("Saved.") and not look.says(lost))
+        code, said = screen.stop()
+    assert code == 130, said
+    first, second, *_ = rows(tmp_path, DIRECTION, "trials")
+    assert "key-time-lost" in first["flags"]
+    assert "key-time-lost" not in second["flags"]
+
+
 def onsets_s(journal: Path) -> list[float]:
     """When the shots began, on the machine's monotonic clock."""
     bodies = [record.get("body", {}) for record in records(journal)]

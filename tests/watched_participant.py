@@ -1,6 +1,7 @@
 """The participant's screen as it is, with an eye on its pages: called as a program with a file, then its own words.
 
-Whenever another page was drawn, the file gets a line: the page's kind and, of a plain message, the text.
+Whenever another page was drawn, the file gets a line: the page's kind and, of a plain message, the text. A second
+file has the process id.
 """
 
 from __future__ import annotations
@@ -21,6 +22,11 @@ def words(file: Path, own: list[str]) -> list[str]:
 def pages(file: Path) -> list[str]:
     """The pages that were shown, from the first to the last."""
     return file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+
+
+def pid(file: Path) -> int:
+    """The process that was started last."""
+    return int(file.with_suffix(".pid").read_text())
 
 
 def watch(file: Path) -> None:
@@ -48,7 +54,9 @@ def _told(page: Any) -> str:
 if __name__ == "__main__":
     from experiments.screens.participant.__main__ import main
 
-    watch(Path(sys.argv.pop(1)))
+    file = Path(sys.argv.pop(1))
+    file.with_suffix(".pid").write_text(str(os.getpid()))
+    watch(file)
     code = main()
     sys.stderr.flush()
     os._exit(code)

@@ -263,7 +263,7 @@ class ParticipantSide:
                 "what else runs on this computer.",
                 seconds=f"{given.stood_still_s:.1f}",
             )
-            self._tell(Trouble(text=lost))
+            self._tell(Trouble(text=lost, trial=step.trial))
         return bool(verdict)
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:

@@ -75,10 +75,14 @@ class ParticipantSeen(Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble(Message):
-    """Something went wrong, and what; or, by its mood, what is done about it."""
+    """Something went wrong, and what; or, by its mood, what is done about it.
+
+    Of a `trial` it stands also below what is saved, until another trial is answered.
+    """
 
     text: str
     mood: str = "bad"
+    trial: Trial | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

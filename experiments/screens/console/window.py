@@ -29,7 +29,7 @@ from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.states import Position, State
-from experiments.session.steps import Failed, Prepared, Rested
+from experiments.session.steps import Answered, Failed, Prepared, Rested, trial_of
 from experiments.session.tracks import Tracks, adaptive_tracks
 
 REFRESH_MS = 100
@@ -76,6 +76,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._brief_until_s: float | None = None
         self._brief_for = -1
         self._lasting, self._failure = ("", "good"), ""
+        self._beside: view.Trouble | None = None
         self.theme: Theme = "dark"
         self._scale = 0.0
         self._build()
@@ -139,6 +140,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
                 if message.failure:
                     self._forget_good()
             case view.Trouble():
+                self._beside = message if message.trial is not None else self._beside
                 self._last(message.text, message.mood)
             case view.Ended():
                 self._end(message)
@@ -192,8 +194,11 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:
+            if self._beside and isinstance(message.word, Answered) and trial_of(message.step) != self._beside.trial:
+                self._beside = None
+            text = f"{text}\n{self._beside.text}" if self._beside else text
             self._failure = text if isinstance(message.word, Failed) else ""
-            self._last(text, "bad" if self._failure else "good")
+            self._last(text, "bad" if self._failure or self._beside else "good")
         elif self._lasting == (self._failure, "bad") and isinstance(message.word, Prepared):
             self._last("", "good")  # it is fired anew: of that a failure before says nothing
         if isinstance(message.word, Rested):
