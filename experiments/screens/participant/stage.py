@@ -53,6 +53,11 @@ class Focus:
         self._lender = 0
 
     @property
+    def here(self) -> bool:
+        """Whether the window has the keys now; where there is no X, that is not known."""
+        return self._ours is not None and self._holder() == self._ours
+
+    @property
     def _ours(self) -> int | None:
         return getattr(self._window, "_window", None)
 
@@ -165,6 +170,8 @@ class Stage:
             toolkit.add_font(look.font_file)  # boxes to type in look for theirs elsewhere
         self._handlers = _Handlers(self)  # pyglet holds them weakly
         self.window.winHandle.push_handlers(self._handlers)
+        if self._focus.here:  # that it came was told to nobody
+            self._handlers.on_activate()
 
     def measure_refresh(self) -> float | None:
         """The refresh rate in Hz; `None` if frames do not come steadily."""
