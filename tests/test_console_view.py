@@ -299,6 +299,14 @@ def test_a_participants_screen_that_is_gone_is_awaited_no_more() -> None:
         assert "Their screen is gone." in detail
 
 
+def test_a_pause_names_the_key_that_starts_a_lost_participants_screen_again() -> None:
+    trial = plan_of(DIRECTION).trials[0]
+    paused = seen(DIRECTION, Position(states=(State.ASKING, State.PAUSED), step=ask(trial)))
+    assert "starts it again" not in instruction(paused).detail
+    gone = replace(paused, participant=ParticipantSeen(failure="killed by signal 9"))
+    assert "Their screen is gone: S starts it again." in instruction(gone).detail
+
+
 def test_after_an_emergency_stop_nothing_comes_next_and_no_end_is_told() -> None:
     trial = plan_of(DIRECTION).trials[0]
     assert progress.coming(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(trial))))

@@ -235,6 +235,9 @@ def _paused(seen: Seen) -> Instruction:
         detail = f"{_sentence(seen.position.why)}\n{again}"
     else:
         detail = phrase("The gun is disarmed, and nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
+        if seen.participant_gone:
+            gone = phrase("Their screen is gone: {restart_key} starts it again.", restart_key=seen.key("restart"))
+            detail = f"{detail}\n{gone}"
     return Instruction(title=phrase("Paused"), detail=detail, mood="wait")
 
 
