@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Protocol
@@ -38,35 +36,8 @@ class Clock(Protocol):
         """A run that stopped at this date and time goes on."""
 
 
-STOOD_S = 1.0
+STANDSTILL_S = 1.0
 """A screen that did not look at its keys for so long stood still: as long as a gun that was away may still be armed."""
-_SETTLED = 3
-"""So many beats in time after that, and what was pressed meanwhile has come."""
-
-
-class Beats:
-    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same loop.
-
-    What was pressed in a standstill is dated in it, or as it comes. Where nothing beats, nothing stands still.
-    """
-
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
-
-    def beat(self) -> None:
-        """The timer beats."""
-        self._in_time = 0 if self._is_late() else self._in_time + 1
-        self._last_s = self._now()
-        if self._in_time == _SETTLED:
-            self._alive_s = self._last_s
-
-    @property
-    def alive_since_s(self) -> float:
-        """Since when; infinity while it stands still, and until what was pressed meanwhile has come."""
-        return math.inf if self._is_late() or self._in_time < _SETTLED else self._alive_s
-
-    def _is_late(self) -> bool:
-        return self._now() - self._last_s > STOOD_S
 
 
 class RealClock:

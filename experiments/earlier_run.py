@@ -15,8 +15,9 @@ from experiments.clock import Clock, date_text
 from experiments.config.door import ConfigError
 from experiments.design.plan import Plan
 from experiments.design.shown_texts import setup_in
-from experiments.record.journal import Contents, JournalError, ShownLanguage, begun, hold_journal
+from experiments.record.journal import Contents, JournalError, ShownLanguage, begun, hold_journal, read_journal
 from experiments.record.journal import head as journal_head
+from experiments.record.replay import last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
 from experiments.study import folders, register
@@ -296,3 +297,15 @@ def begun_language(request: RunRequest, code: str) -> Language:
     except ConfigError as error:
         why = f"{error}; resume with the catalogue it began with"
         raise NotAsItBegan(_journal_of(request), why, "--catalogues DIR") from error
+
+
+def begins_halted(where: Place, before: Contents | None) -> bool:
+    """Whether the last that a participant had in their hand ended by an emergency stop: practices, runs set aside too.
+
+    Whatever they do next begins with a test shot, then. `before`: what their own journal holds, where they go on.
+    """
+    last = ("", False) if before is None else last_word_on_gun(before)
+    for path in where.folder.glob("*_journal*.jsonl"):
+        with suppress(JournalError):  # one that cannot be read is named where it is to be used
+            last = max(last, last if path == where.journal else last_word_on_gun(read_journal(path)))
+    return last[1]

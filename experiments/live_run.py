@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import NoReturn, Protocol
 
 from device import DeviceError, Gun, GunStatus
 from device.messages import RecoilError
-from experiments.clock import Beats, Clock
+from experiments.clock import STANDSTILL_S, Clock
 from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalError, JournalGone
 from experiments.session import events, judging
@@ -90,6 +90,35 @@ class Screen(Protocol):
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
         """Show what the gun itself says of its state, or why it says nothing."""
+
+
+_SETTLED = 3
+"""So many beats in time after that, and what was pressed meanwhile has come."""
+
+
+class Beats:
+    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same loop.
+
+    What was pressed in a standstill is dated in it, or as it comes. Where nothing beats, nothing stands still.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
+
+    def beat(self) -> None:
+        """The timer beats."""
+        self._in_time = 0 if self._is_late() else self._in_time + 1
+        self._last_s = self._now()
+        if self._in_time == _SETTLED:
+            self._alive_s = self._last_s
+
+    @property
+    def alive_since_s(self) -> float:
+        """Since when; infinity while it stands still, and until what was pressed meanwhile has come."""
+        return math.inf if self._is_late() or self._in_time < _SETTLED else self._alive_s
+
+    def _is_late(self) -> bool:
+        return self._now() - self._last_s > STANDSTILL_S
 
 
 class LiveRun:

@@ -19,7 +19,15 @@ from experiments.design.planning import plan_of, practice_of
 from experiments.design.shown_texts import setup_in
 from experiments.design.stimuli import Stimuli, by_hand, stimuli_of
 from experiments.design.streams import generator
-from experiments.earlier_run import EarlierRun, earlier_run, give_way, resumed_plan, what_changed, words_shown
+from experiments.earlier_run import (
+    EarlierRun,
+    begins_halted,
+    earlier_run,
+    give_way,
+    resumed_plan,
+    what_changed,
+    words_shown,
+)
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.rebuild import table
 from experiments.record import replay
@@ -115,6 +123,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             for changed in what_changed(before, request, gun):
                 screen.trouble(changed)
                 live.remark(Noted(trial=None, text=changed))
+            position = _halted_before(position, place, before, live)
             settle = recorder.settle if recorder else None
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
 
@@ -273,9 +282,9 @@ def _resume(
     return replay.go_on(session, before, position, journal.append)
 
 
-def _halted_before(position: RunPosition, place: Place, live: LiveRun) -> RunPosition:
+def _halted_before(position: RunPosition, place: Place, before: Contents | None, live: LiveRun) -> RunPosition:
     """Where a run stands; what its participant did before it may owe it a test shot too, which is noted."""
-    if position.halted or not folders.begins_halted(place):
+    if position.halted or not begins_halted(place, before):
         return position
     live.remark(Noted(trial=None, text=HALTED_BEFORE))
     return replace(position, halted=True)
@@ -291,7 +300,7 @@ def _to_the_end(
     """
     try:
         try:
-            carry_out(session, desk, _halted_before(position, place, desk.live))
+            carry_out(session, desk, position)
         finally:
             if settle is not None:
                 settle()

@@ -13,7 +13,7 @@ import pytest
 
 from device import LimitError, LinkError
 from device.serial_gun.triggering import ARM_WITHIN_S
-from experiments.clock import STOOD_S
+from experiments.clock import STANDSTILL_S
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
@@ -215,7 +215,7 @@ def test_a_standstill_as_long_as_a_gun_may_be_away_keeps_no_shot(tmp_path: Path)
         looks(sitting, 10)
         sitting.clock.skip(ARM_WITHIN_S / 2)
         assert by_hand(sitting, events.Fire())
-    assert STOOD_S == ARM_WITHIN_S
+    assert STANDSTILL_S == ARM_WITHIN_S
 
 
 def test_what_holds_stops_or_answers_counts_however_long_the_screen_stood_still(tmp_path: Path) -> None:

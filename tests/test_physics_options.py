@@ -152,18 +152,13 @@ def test_a_held_shot_is_that_of_another_program():
     assert held.impact_speed_m_s == pytest.approx(0.1322, abs=1e-4)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("drive_off", ["shorted", "open"])
-def test_the_peaks_of_a_held_shot_are_between_its_steps(drive_off):
-    """Each stretch is looked at a thousand times as often as it was stepped."""
-    gun, grip = GunParameters(drive_off=drive_off), HandMechanics(stiffness_N_m=2000.0, damping_N_s_m=2.0)
-    kick_m, felt_N = 0.0, 0.0
-    for one in hand._stretches(gun, grip, 0.4, dense=True):
-        x, v = one.between(np.linspace(one.times[0], one.times[-1], 20_001))[3:5]
-        kick_m, felt_N = max(kick_m, x.max()), max(felt_N, np.abs(2000.0 * x + 2.0 * v).max())
-    held = simulate_held(gun, grip)
-    assert held.peak_kick_m == pytest.approx(kick_m, rel=1e-7)
-    assert held.peak_hand_force_N == pytest.approx(felt_N, rel=1e-7)
+def test_the_peaks_of_a_held_shot_are_those_between_its_steps():
+    """By another program, which looked between the steps: they were up to 0.2 % too low."""
+    for drive_off in ("open", "shorted"):
+        held = simulate_held(GunParameters(drive_off=drive_off), HandMechanics())
+        assert held.peak_kick_m == pytest.approx(4.69254e-3, rel=2e-5)
+    held = simulate_held(GunParameters(drive_off="open"), HandMechanics(stiffness_N_m=2000.0, damping_N_s_m=2.0))
+    assert held.peak_hand_force_N == pytest.approx(10.863, rel=2e-5)
 
 
 @pytest.mark.slow

@@ -407,18 +407,6 @@ def _missed(where: Place) -> list[bool]:
     return found
 
 
-def begins_halted(where: Place) -> bool:
-    """Whether the last that a participant had in their hand ended by an emergency stop: practices, runs set aside too.
-
-    Whatever they do next begins with a test shot, then.
-    """
-    last = "", False
-    for path in where.folder.glob("*_journal*.jsonl"):
-        with suppress(JournalError):  # one that cannot be read is named where it is to be used
-            last = max(last, replay.last_word_on_gun(journal.read_journal(path)))
-    return last[1]
-
-
 def refuse_without_practice(setup: Setup[DesignConfig]) -> None:
     """`PlaceError` if a design has no practice."""
     if not setup.config.practice.repetitions:

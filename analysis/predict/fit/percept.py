@@ -198,12 +198,12 @@ def verdict_sentence(case: Judged) -> str:
         found.setdefault(_verdict(alike), []).append(f"{quantity} = {' or '.join(one.published for one in alike)}")
     whole = next(claim for claim in case.claims if claim.claim == WHOLE_PATTERN)
     recurs = f"the whole pattern of significance recurs in {apa.percent(whole.share)} of the studies {_percents(whole)}"
-    told = [f"{words}: {'; '.join(found[words])}" for words in (AT_ODDS, TOO_FEW) if words in found]
+    told = [f"{words}: {'; '.join(found[words])}" for words in (AT_ODDS, TOO_FEW_STUDIES) if words in found]
     return f"{'; '.join(told or [WITHIN])}; {recurs}."
 
 
 AT_ODDS = "At odds with the paper (outside the central 95 % of the studies)"
-TOO_FEW = "Too few studies to tell whether these lie within their central 95 %"
+TOO_FEW_STUDIES = "Too few studies to tell whether these lie within their central 95 %"
 WITHIN = "Every number that was not fitted lies within the central 95 % of the studies"
 
 
@@ -212,7 +212,7 @@ def _verdict(alike: Sequence[PublishedPlace]) -> str:
     low, high = OUTSIDE / 2.0, 1.0 - OUTSIDE / 2.0
     if all(place.ci_high < low or place.ci_low > high for place in alike):
         return AT_ODDS
-    return WITHIN if any(place.ci_low >= low and place.ci_high <= high for place in alike) else TOO_FEW
+    return WITHIN if any(place.ci_low >= low and place.ci_high <= high for place in alike) else TOO_FEW_STUDIES
 
 
 def sections(found: FittedPercept, histograms: Sequence[Histograms], figures: Path) -> tuple[Section, ...]:

@@ -18,7 +18,7 @@ from PyQt6.QtWidgets import QVBoxLayout, QWidget
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
 from device.methods import drive_of
 from device.words import Drive, Effect
-from experiments.clock import STOOD_S, Clock
+from experiments.clock import STANDSTILL_S, Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.screens.console import widgets
@@ -115,7 +115,7 @@ class ShotCheck:
             self._tell(ShotProgress(phase="counting", seconds=seconds))
             if self._off.wait(1.0):
                 break
-            if self._clock.now() - told_s > 1.0 + STOOD_S:  # what was pressed meanwhile is not heard yet
+            if self._clock.now() - told_s > 1.0 + STANDSTILL_S:  # what was pressed meanwhile is not heard yet
                 return phrase("The console stood still in the countdown: nothing was fired.")
         if not self._off.is_set():
             self._report = self._armed_shot(gun, drive)
