@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
@@ -120,9 +120,7 @@ def run(request: RunRequest, make_screen: MakeScreen, clock: Clock) -> Finished:
             )
             desk = Desk(live=live, stimuli=stimuli)
             screen.begin(live)
-            for changed in what_changed(before, request, gun):
-                screen.trouble(changed)
-                live.remark(Noted(trial=None, text=changed))
+            _tell(live, screen, what_changed(before, request, gun))
             position = _halted_before(position, place, before, live)
             settle = recorder.settle if recorder else None
             return Finished(plan=plan, place=place, saved=_to_the_end(session, desk, position, place, settle))
@@ -280,6 +278,13 @@ def _resume(
     position = replay.replay(session, before, told)
     journal.append("resumed", cut_bytes=before.cut_bytes, stopped_utc=before.records[-1].utc, **head)
     return replay.go_on(session, before, position, journal.append)
+
+
+def _tell(live: LiveRun, screen: Screen, changes: Iterable[str]) -> None:
+    """Say what is not as it was before, and have it on record."""
+    for changed in changes:
+        screen.trouble(changed)
+        live.remark(Noted(trial=None, text=changed))
 
 
 def _halted_before(position: RunPosition, place: Place, before: Contents | None, live: LiveRun) -> RunPosition:
