@@ -18,7 +18,7 @@ import pytest
 from experiments.screens.console.keys import BOUNCE_S, BY_NAME
 from tests import watched_participant
 from tests.at_runs import RUN, words
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import PATIENCE_S, stand_still, wait_for
 from tests.warm_start import warm
 from tests.watched_console import Look, Watch
 
@@ -274,7 +274,7 @@ class AtConsole(AtDisplay):
     def standing_still(self, seconds: float) -> Iterator[None]:
         """The program stands still while something is done, and after it for so long."""
         pid = self.look().pid
-        os.kill(pid, signal.SIGSTOP)
+        stand_still(pid)
         try:
             yield
             time.sleep(seconds)

@@ -28,7 +28,7 @@ from tests.at_display import (
 from tests.at_hand import check_gun
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, answers, rows
 from tests.conftest import RECOIL
-from tests.waiting import wait_for
+from tests.waiting import stand_still, wait_for
 from tests.watched_console import Look, Watch
 
 pytest.importorskip("PyQt6")
@@ -252,9 +252,20 @@ def kept(address: str) -> Iterator[None]:
         os.close(line)
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def gone(twin: subprocess.Popen[str]) -> None:
+    """The twin is killed, and has ended."""
+    twin.kill()
+    twin.wait()
+
+
+def silent(twin: subprocess.Popen[str]) -> None:
+    """The twin is there, and does nothing."""
+    stand_still(twin.pid)
+
+
+@pytest.mark.parametrize("befalls", [gone, silent])
 def test_a_gun_that_went_silent_before_the_emergency_stop_is_never_shown_as_disarmed(
-    quick_configs: Path, tmp_path: Path, display: str, number: signal.Signals
+    quick_configs: Path, tmp_path: Path, display: str, befalls: Callable[[subprocess.Popen[str]], None]
 ) -> None:
     def told(look: Look) -> bool:
         assert not look.says("The gun itself says that it is disarmed.")
@@ -268,7 +279,7 @@ def test_a_gun_that_went_silent_before_the_emergency_stop_is_never_shown_as_disa
         screen.to("asking", trial=1)
         screen.until(lambda look: look.says("SIMULATED GUN – nothing is felt"))  # a twin is one as well
         with kept(address):
-            twin.send_signal(number)
+            befalls(twin)
             screen.keys.press("F12")
             screen.until(told)
             screen.keys.press("q")
@@ -306,7 +317,7 @@ def test_a_gun_that_does_not_answer_is_not_fired_and_once_it_answers_it_is(
     ):
         screen.stands(RUN)
         screen.to("preparing", trial=1)
-        twin.send_signal(signal.SIGSTOP)
+        stand_still(twin.pid)
         look = screen.until(lambda look: look.says("See to the gun first"))
         assert not look.says("Fire\n[Space]")
         screen.keys.press("space")

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display, wait_for
+from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
+from tests.waiting import stand_still, wait_for
 from tests.warm_start import warm
 
 pytestmark = [
@@ -225,7 +226,7 @@ def test_a_time_that_is_lost_is_said_until_the_next_trial_is_answered(
         screen.stands(RUN)
         screen.to("asking", trial=1)
         screen.participant_shows("ChoicePage")
-        os.kill(screen.participant_pid, signal.SIGSTOP)
+        stand_still(screen.participant_pid)
         screen.keys.press("Up")
         time.sleep(0.5)
         os.kill(screen.participant_pid, signal.SIGCONT)

@@ -31,7 +31,7 @@ from tests.at_participant import (
     show,
     started,
 )
-from tests.waiting import PATIENCE_S, wait_for
+from tests.waiting import PATIENCE_S, stand_still, wait_for
 
 __all__ = ["ask", "console", "display", "hands", "link", "pytestmark"]
 
@@ -198,7 +198,7 @@ def test_a_key_that_goes_down_while_the_program_stands_still_says_for_how_long(
         show(link, "Please wait")
         question = replace(WHICH, onset_s=time.monotonic())
         answer = hands.changing(lambda: console.submit(link.ask_choice, question))
-        os.kill(link.pid, signal.SIGSTOP)
+        stand_still(link.pid)
         hands.key("f")
         time.sleep(0.5)
         os.kill(link.pid, signal.SIGCONT)
@@ -212,7 +212,7 @@ def test_a_program_that_stands_still_while_nothing_is_asked_is_noticed(display, 
     monkeypatch.setenv("HOME", str(tmp_path))
     with ParticipantLink.start(Look()) as link:
         link.wait_ready(PATIENCE_S)
-        os.kill(link.pid, signal.SIGSTOP)
+        stand_still(link.pid)
         wait_for(lambda: link.failure)
         assert link.failure == "the participant's screen stood still for 5 s and was ended"
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 PATIENCE_S = 300.0
@@ -21,3 +24,14 @@ def wait_for(
             raise AssertionError(why if isinstance(why, str) else why())
         time.sleep(look_s)
     return found
+
+
+def stand_still(pid: int) -> None:
+    """Make a program stand still, and wait until all of it does: a busy machine lets it hear a key after the signal."""
+    os.kill(pid, signal.SIGSTOP)
+    wait_for(lambda: all(_state(thread) == "T" for thread in Path(f"/proc/{pid}/task").iterdir()))
+
+
+def _state(thread: Path) -> str:
+    """A thread's state as the system's table of it has it: behind its name, which ends with the last bracket."""
+    return (thread / "stat").read_text().rpartition(")")[2].split()[0]
