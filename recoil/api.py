@@ -217,7 +217,7 @@ def power(
 def _threshold_plan(request: PowerRequest, people: int | None) -> ThresholdPower | None:
     """The plan of a threshold; `None` of a config that has none."""
     from analysis.predict.threshold_plan.run import (
-        OBSERVERS,
+        PEOPLE,
         TRACK_TRIALS,
         ThresholdRequest,
         procedures_of,
@@ -239,7 +239,7 @@ def _threshold_plan(request: PowerRequest, people: int | None) -> ThresholdPower
             ThresholdRequest(
                 config=request.config,
                 trials=request.trials or TRACK_TRIALS,
-                observers=people or OBSERVERS,
+                people=people or PEOPLE,
                 seed=request.seed,
             )
         )

@@ -210,7 +210,7 @@ def test_a_study_that_the_published_numbers_do_not_fit_is_that_of_its_configs(tm
     study = tmp_path / "quick" / "study.toml"
     study.write_text(study.read_text().replace("participants = 14", "participants = 2"))
     assert "the study has 2 participants, the paper 14" in prepared(str(study), 1).notes[0]
-    asked = warm("reproduce", "--study", study, "--out", tmp_path / "no", "--observer", "reconstructed")
+    asked = warm("reproduce", "--study", study, "--out", tmp_path / "no", "--synthetic", "reconstructed")
     refused = subprocess.run(asked, check=False, capture_output=True, text=True)
     assert (refused.returncode, "the study has 2 participants" in refused.stderr) == (2, True)
     told = warm("reproduce", "--study", study, "--out", study)

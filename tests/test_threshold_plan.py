@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.predict.threshold_plan.observers import Observers, answers_by, procedures
 from analysis.predict.threshold_plan.page import plan_in_short, sections_of_plan
+from analysis.predict.threshold_plan.people import SyntheticPeople, answers_by, procedures
 from analysis.predict.threshold_plan.run import ThresholdPower, ThresholdRequest, procedures_of, threshold_power
 from experiments.config.door import ConfigError
 from tests.conftest import Recoil
 
 LEVELS = (6.0, 8.0, 10.0, 12.0, 14.0, 18.0)
-PEOPLE = Observers(thresholds=np.full(40, 10.0), spread=0.05, lapse=0.0, guess=0.5, chance=True)
+PEOPLE = SyntheticPeople(thresholds=np.full(40, 10.0), spread=0.05, lapse=0.0, guess=0.5, chance=True)
 
 
 @pytest.fixture(scope="module")
 def found() -> ThresholdPower:
-    return threshold_power(ThresholdRequest(config="voltages", trials="10,20", observers=6))
+    return threshold_power(ThresholdRequest(config="voltages", trials="10,20", people=6))
 
 
 @pytest.mark.slow
@@ -54,7 +54,7 @@ def test_each_procedure_and_number_of_trials_has_its_figures(found: ThresholdPow
     assert set(found.best) == {"10", "20"}
     assert all(one.width > 0 and one.rms_error >= abs(one.bias) for one in found.procedures)
     assert found.procedures[0].minutes == pytest.approx(10 * 17 / 60)
-    again = threshold_power(ThresholdRequest(config="voltages", trials="20", observers=6))
+    again = threshold_power(ThresholdRequest(config="voltages", trials="20", people=6))
     assert again.to_frame().shape == (4, 9)
 
 
@@ -71,7 +71,7 @@ def test_a_plan_says_which_procedure_to_take_and_what_was_assumed(found: Thresho
 
 @pytest.mark.slow
 def test_a_plan_does_not_say_of_a_designs_own_rule_what_another_would_do(tmp_path: Path) -> None:
-    own = threshold_power(ThresholdRequest(config="threshold", trials="10", observers=4))
+    own = threshold_power(ThresholdRequest(config="threshold", trials="10", people=4))
     how = sections_of_plan(own, tmp_path)[2].items[1]
     assert how.endswith(" The posterior rule is that of the design, at its levels.")
 

@@ -25,7 +25,7 @@ from analysis.report.terminal import (
 from device.messages import RecoilError, few_of_each
 
 
-class ObserverName(StrEnum):
+class SyntheticName(StrEnum):
     """Who answers in a reproduction."""
 
     reconstructed = "reconstructed"
@@ -38,10 +38,10 @@ def reproduce(
     ),
     seed: FixedSeedOption = 1,
     study: Annotated[str, typer.Option(help="Config of a study, or the name of a shipped one.")] = "study",
-    observer: Annotated[
-        ObserverName | None,
+    synthetic: Annotated[
+        SyntheticName | None,
         typer.Option(
-            help="Which simulated participants: `reconstructed` so that their logs give the published numbers back "
+            help="Which synthetic participants: `reconstructed` so that their logs give the published numbers back "
             "(where the study is that paper's), or drawn at the `rates` of the configs."
         ),
     ] = None,
@@ -51,8 +51,8 @@ def reproduce(
     from analysis.predict.reproduction import reproduce as feature
     from analysis.predict.reproduction.study import prepared
 
-    loaded = prepared(study, seed, observer.value if observer else None)
-    if not loaded.reconstructed and observer is None:
+    loaded = prepared(study, seed, synthetic.value if synthetic else None)
+    if not loaded.reconstructed and synthetic is None:
         say("\n".join(f"recoil: {note}" for note in loaded.notes))
     say_how_long(feature.reproduction_time_s(loaded))
     with progress("reproduce", len(loaded.runs) + 3) as tell:

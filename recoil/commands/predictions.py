@@ -133,9 +133,9 @@ def _check_only(ctx: typer.Context, why: str, known: tuple[str, ...]) -> None:
 
 def _of_threshold(config: str, trials: str | None, people: int | None, seed: int, out: Path, as_json: bool) -> None:
     from analysis.predict.threshold_plan import page
-    from analysis.predict.threshold_plan.run import OBSERVERS, TRACK_TRIALS, ThresholdRequest
+    from analysis.predict.threshold_plan.run import PEOPLE, TRACK_TRIALS, ThresholdRequest
 
-    request = ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, observers=people or OBSERVERS, seed=seed)
+    request = ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, people=people or PEOPLE, seed=seed)
     found = page.threshold_plan(request, out, terminal.progress)
     terminal.show(found, f"{terminal.in_text(page.plan_in_short(found))}\nReport: {out / 'report.html'}", as_json)
 

@@ -33,11 +33,11 @@ _TARGET = 0.8
 
 def procedure_errors(request: BenchRequest) -> Measured:
     """What synthetic people's thresholds are off by, by procedure and trials."""
-    plan = ThresholdRequest(config=_THRESHOLD_DESIGN, trials=_TRIALS, observers=request.people, seed=request.seed)
+    plan = ThresholdRequest(config=_THRESHOLD_DESIGN, trials=_TRIALS, people=request.people, seed=request.seed)
     with request.progress("bench procedures", len(procedures_of(plan.config))) as tell:
         found = threshold_power(plan, tell)
     text = (
-        f"The design is `{_THRESHOLD_DESIGN}`, with {found.observers} synthetic people a procedure. The error is the "
+        f"The design is `{_THRESHOLD_DESIGN}`, with {found.people} synthetic people a procedure. The error is the "
         "root of the mean squared one. `recoil power` shows the same of a design of yours."
     )
     return Measured(

@@ -67,7 +67,7 @@ def reconstructed_people(
         try:
             law, note = _answers(studies, table_name(setup), paper, codes, seed)
         except ValueError as error:
-            raise ConfigError(f"{setup.source}: {error}; try another --seed, or --observer rates") from error
+            raise ConfigError(f"{setup.source}: {error}; try another --seed, or --synthetic rates") from error
         people.append(replace(setup, laws=_with_law(setup, studies.question, law)))
         notes.append(note)
     return tuple(people), tuple(notes)

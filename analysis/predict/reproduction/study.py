@@ -30,7 +30,7 @@ from experiments.study import folders
 
 MANIFEST = "reproduction.json"
 
-Observer = Literal["reconstructed", "rates"]
+Synthetic = Literal["reconstructed", "rates"]
 """Who answers: participants rebuilt from the published numbers, or those that the configs describe."""
 
 
@@ -73,7 +73,7 @@ class ReproducedStudy:
         }
 
 
-def prepared(name: str, seed: int, observer: Observer | None = None) -> ReproducedStudy:
+def prepared(name: str, seed: int, synthetic: Synthetic | None = None) -> ReproducedStudy:
     """A study from its config, with reconstructed participants unless others are asked for or those do not fit it.
 
     `ConfigError` for configs that cannot be used, and if reconstructed participants are asked for and do not fit.
@@ -83,8 +83,8 @@ def prepared(name: str, seed: int, observer: Observer | None = None) -> Reproduc
     paper = load_paper(folder / config.paper) if config.paper else None
     claims = load_paper_file(folder / config.paper) if config.paper else None
     study = ReproducedStudy(config=config, setups=setups, answering=setups, seed=seed, paper=paper, claims=claims)
-    reason = "other participants were asked for" if observer == "rates" else misfit(config, setups, paper)
-    if observer == "reconstructed" and reason:
+    reason = "other participants were asked for" if synthetic == "rates" else misfit(config, setups, paper)
+    if synthetic == "reconstructed" and reason:
         raise ConfigError(f"{name}: no reconstructed participants: {reason}")
     if paper is None or reason:
         return replace(study, notes=(f"The participants are those of the configs: {reason}.",))

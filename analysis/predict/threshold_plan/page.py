@@ -62,7 +62,7 @@ def sections_of_plan(found: ThresholdPower, figures: Path) -> tuple[Section, ...
 
 def plan_in_short(found: ThresholdPower) -> Section:
     """Which procedure to take, by number of trials."""
-    title = f"{found.title}: threshold of {found.question}, {found.observers} simulated people a procedure"
+    title = f"{found.title}: threshold of {found.question}, {found.people} simulated people a procedure"
     return Section(title=title, items=tuple(_lines(found)))
 
 
@@ -71,8 +71,8 @@ def _lines(found: ThresholdPower) -> Iterator[str]:
     for trials, best in found.best.items():
         some = {one.procedure: one for one in found.procedures if one.trials == int(trials)}
         least, rest = some.pop(best), "; ".join(_words(one, digits) for one in some.values())
-        alike = [name for name, one in some.items() if _alike(least, one, found.observers)]
-        told = f" Not told apart from it by {found.observers} people: {', '.join(alike)}." if alike else ""
+        alike = [name for name, one in some.items() if _alike(least, one, found.people)]
+        told = f" Not told apart from it by {found.people} people: {', '.join(alike)}." if alike else ""
         yield f"{trials} trials ({least.minutes:.0f} min): take {_words(least, digits)}.{told} Others: {rest}."
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from analysis.predict.power.grid import whole_numbers
-from analysis.predict.threshold_plan.observers import Answers, Observers, answers_by, procedures
+from analysis.predict.threshold_plan.people import Answers, SyntheticPeople, answers_by, procedures
 from analysis.psychometric.people import PersonFit, ShareAtLevel, person_fit
 from analysis.psychometric.priors import Priors
 from analysis.report.serial import UNWRITTEN, NotebookResult, plain
@@ -27,7 +27,7 @@ from experiments.record.provenance import provenance
 from experiments.synthetic.laws import PsychometricLaw, SyntheticAnswers
 from experiments.tasks.questions import chance
 
-OBSERVERS, TRACK_TRIALS = 200, "20,40,80"
+PEOPLE, TRACK_TRIALS = 200, "20,40,80"
 _FEWEST, _MOST = 10, 400
 
 
@@ -37,7 +37,7 @@ class ThresholdRequest:
 
     config: str
     trials: str = TRACK_TRIALS
-    observers: int = OBSERVERS
+    people: int = PEOPLE
     seed: int = 1
 
 
@@ -74,7 +74,7 @@ class ThresholdPower(NotebookResult):
     factor: str
     share: FittedShare
     seed: int
-    observers: int
+    people: int
     levels: tuple[float, ...]
     threshold: float
     spread: float
@@ -132,7 +132,7 @@ def threshold_power(request: ThresholdRequest, tell: Callable[[str], None] = unt
         factor=planned.factor,
         share=planned.share,
         seed=request.seed,
-        observers=request.observers,
+        people=request.people,
         levels=planned.levels,
         threshold=planned.threshold,
         spread=law.spread,
@@ -182,8 +182,8 @@ def _own_sd(planned: _Planned) -> float:
 def _of_procedure(
     procedure: str, planned: _Planned, trials: Sequence[int], request: ThresholdRequest
 ) -> Iterator[ProcedurePower]:
-    own = generator(request.seed, "threshold power", "people").normal(size=request.observers) * _own_sd(planned)
-    people = Observers(
+    own = generator(request.seed, "threshold power", "people").normal(size=request.people) * _own_sd(planned)
+    people = SyntheticPeople(
         thresholds=planned.threshold * np.exp(own),
         spread=planned.law.spread,
         lapse=planned.lapse,
@@ -195,7 +195,7 @@ def _of_procedure(
     priors = priors_of(planned.design, np.array(planned.levels))
     known = planned.guess if planned.share == "right" else None
     for count in trials:
-        fits = [_fit(answers, place, count, known, priors) for place in range(request.observers)]
+        fits = [_fit(answers, place, count, known, priors) for place in range(request.people)]
         yield _power(procedure, planned, count, fits, people.thresholds)
 
 

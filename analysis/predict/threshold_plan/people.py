@@ -27,7 +27,7 @@ _PROCEDURES = ("constant stimuli", "2-down-1-up", "3-down-1-up", "posterior")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Observers:
+class SyntheticPeople:
     """People with thresholds (n,): right, or yes, with g + (1 - g - lapse) F(ln(x / threshold) / spread).
 
     `chance`: whether g is that of somebody who guesses, which the rule and the fit know.
@@ -48,7 +48,7 @@ class Observers:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answers:
-    """What was felt and whether it was right: (observers, trials) each."""
+    """What was felt and whether it was right: (people, trials) each."""
 
     levels: FloatArray
     right: FloatArray
@@ -61,7 +61,7 @@ def procedures(share: FittedShare) -> tuple[str, ...]:
 
 def answers_by(
     procedure: str,
-    people: Observers,
+    people: SyntheticPeople,
     levels: Sequence[float],
     trials: int,
     stream: np.random.Generator,
@@ -79,7 +79,7 @@ def answers_by(
     return _track(int(procedure[0]), people, levels, trials, stream)
 
 
-def _constant(people: Observers, levels: FloatArray, trials: int, stream: np.random.Generator) -> Answers:
+def _constant(people: SyntheticPeople, levels: FloatArray, trials: int, stream: np.random.Generator) -> Answers:
     blocks = [
         stream.permuted(np.tile(levels, (people.thresholds.size, 1)), axis=1) for _ in range(-(-trials // levels.size))
     ]
@@ -88,7 +88,9 @@ def _constant(people: Observers, levels: FloatArray, trials: int, stream: np.ran
     return Answers(levels=shown, right=(stream.random(shown.shape) < shares).astype(float))
 
 
-def _track(down: int, people: Observers, levels: Sequence[float], trials: int, stream: np.random.Generator) -> Answers:
+def _track(
+    down: int, people: SyntheticPeople, levels: Sequence[float], trials: int, stream: np.random.Generator
+) -> Answers:
     """From the highest level, in steps of an eighth, a sixteenth and a thirtieth of the range."""
     low, high = min(levels), max(levels)
     span = high - low
@@ -111,7 +113,7 @@ def _track(down: int, people: Observers, levels: Sequence[float], trials: int, s
 
 
 def _posterior(
-    people: Observers,
+    people: SyntheticPeople,
     levels: Sequence[float],
     trials: int,
     stream: np.random.Generator,
@@ -130,7 +132,7 @@ def _posterior(
     return Answers(levels=shown, right=right)
 
 
-def _vague_rule(people: Observers, levels: Sequence[float]) -> VarianceRule:
+def _vague_rule(people: SyntheticPeople, levels: Sequence[float]) -> VarianceRule:
     """Guess rates are known of right answers alone."""
     low, high = min(levels), max(levels)
     span = high - low
