@@ -97,7 +97,7 @@ _SETTLED = 3
 
 
 class Beats:
-    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same loop.
+    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same program.
 
     What was pressed in a standstill is dated in it, or as it comes. Where nothing beats, nothing stands still.
     """

@@ -243,6 +243,15 @@ def test_nor_is_the_test_shot_after_an_emergency_stop(tmp_path: Path) -> None:
         assert by_hand(sitting, events.Rearm(held_s=1.0))
 
 
+def test_a_test_shot_that_was_typed_while_the_screen_stood_still_is_not_fired(tmp_path: Path) -> None:
+    with sat_at(S.REARMING, tmp_path) as sitting:
+        looks(sitting, 10)
+        sitting.clock.skip(9.0)
+        assert by_hand(sitting, events.Rearm(held_s=None)).text.startswith("The console stood still as that was")
+        looks(sitting, 5)
+        assert by_hand(sitting, events.Rearm(held_s=None))
+
+
 def test_next_is_taken_from_the_least_exposure_on_and_not_before_the_first_shot(tmp_path: Path) -> None:
     with sat(PREFERENCE, tmp_path) as sitting:
         sitting.to(S.PREPARING)

@@ -6,6 +6,8 @@ import csv
 import json
 import re
 import signal
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +15,18 @@ import pytest
 
 from tests.at_terminal import DAMPER, FIRES, AtTerminal
 from tests.conftest import Recoil
-from tests.waiting import wait_for
+from tests.waiting import stand_still, wait_for
 from tests.warm_start import warm
 
 pytestmark = pytest.mark.slow
 
 
+def recoil_words(configs: Path, experiment: str, *more: object) -> list[object]:
+    return ["run", configs / f"{experiment}.toml", "--participant", "P01", "--results", "results", *more]
+
+
 def run(configs: Path, experiment: str, *more: object) -> list[str]:
-    return warm("run", configs / f"{experiment}.toml", "--participant", "P01", "--results", "results", *more)
+    return warm(*recoil_words(configs, experiment, *more))
 
 
 def rows(folder: Path, name: str) -> list[dict[str, str]]:
@@ -262,6 +268,28 @@ def test_what_is_typed_ahead_fires_nothing_and_answers_nothing(quick_configs: Pa
         assert screen.end() == 130
     assert bodies(tmp_path, "fired") == bodies(tmp_path, "answered") == []
     assert {one["because"] for one in bodies(tmp_path, "refused")} >= {"Too soon after the change: press again."}
+
+
+def test_what_is_typed_while_the_program_stands_still_fires_nothing(quick_configs: Path, tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "recoil", *recoil_words(quick_configs, "direction", "--seed", 1)]
+    with AtTerminal(words, tmp_path) as screen:  # not a warm one, whose process stands in for the program
+        screen.wait_for(DAMPER)
+        screen.type("d")
+        screen.wait_for(FIRES)
+        stand_still(screen.process.pid)
+        screen.type("")
+        screen.type("")
+        time.sleep(1.5)  # this is how long it stands still
+        screen.process.send_signal(signal.SIGCONT)
+        screen.wait_for("The console stood still as that was pressed: look where the gun is, and press again.", 2)
+        assert bodies(tmp_path, "fired") == []
+        time.sleep(1.0)  # this is the hand that looks
+        screen.type("")
+        screen.wait_for("b = backward:")
+        screen.type("stop")
+        assert screen.end() == 130
+    assert [one["event"] for one in bodies(tmp_path, "refused")] == ["fire", "fire"]
+    assert len(bodies(tmp_path, "fired")) == 1
 
 
 def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp_path: Path) -> None:

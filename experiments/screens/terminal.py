@@ -10,6 +10,7 @@ import io
 import os
 import sys
 import threading
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
@@ -43,7 +44,7 @@ _HALTED = (
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
-_TICK_S = 1.0
+_TICK_S, _BEAT_S = 1.0, 0.1
 _F12 = "[24~"
 """What is left on a line of the console's key for an emergency stop."""
 
@@ -78,7 +79,7 @@ class TerminalScreen:
         band = "SIMULATED GUN – nothing is felt.\n" if is_simulated(live.gun_name) else ""
         band += "PRACTICE – never analysed.\n" if self._plan.practice else ""
         self._say(f"{band}Participant {self._plan.participant_id}, experiment {self._plan.experiment}.\n{_HELP}")
-        for target in (self._read, self._count_down):
+        for target in (self._read, self._count_down, self._beat):
             threading.Thread(target=target, daemon=True, name="terminal").start()
 
     def act(self, position: Position, until_s: float | None) -> None:
@@ -237,6 +238,12 @@ class TerminalScreen:
                 position = self._shown
                 if position.state is State.RESTING and position.until_s is not None:
                     self._show(_counted(max(0.0, position.until_s - self._clock.now())))
+
+    def _beat(self) -> None:
+        """Beat: where the program stands still nothing does, and what was typed meanwhile is known by that."""
+        while self._live is not None and self._shown.state is not State.STOPPED:
+            self._live.beats.beat()
+            time.sleep(_BEAT_S)
 
     def _say(self, text: str) -> None:
         self._show(f"{text}\n")

@@ -318,10 +318,7 @@ ACTS: tuple[type[Event], ...] = (
 """What carries the run on: by the experimenter's hand it counts only for the screen on which its press began."""
 
 TO_FIRE = (Fire, GoOn)
-"""What leads to a shot: pressed on a screen that stood still, it would come when nobody expects it any more.
-
-A key that is held for a test shot counts only as long as the screen looks at it.
-"""
+"""What leads to a shot: pressed on a screen that stood still, it would come when nobody expects it any more."""
 
 TYPED: tuple[type[Event], ...] = (Flag, Note, Reason)
 """What is typed in a line that lay over what stands there: its Enter is not to act a second time."""

@@ -135,9 +135,14 @@ def _mistimed(moment: Moment, event: Event, press: Press | None) -> str:
         return ""
     if press.serial != moment.position.serial or moment.painted_s is None:
         return "That was pressed for what stood there before: press again."
-    if isinstance(event, TO_FIRE) and press.at_s < moment.alive_since_s:
+    if _fires(event) and press.at_s < moment.alive_since_s:
         return "The console stood still as that was pressed: look where the gun is, and press again."
     return "" if moment.is_ready(press.at_s) else "Too soon after the change: press again."
+
+
+def _fires(event: Event) -> bool:
+    """Whether an event leads to a shot by the press alone; a key that is held counts only while it is looked at."""
+    return isinstance(event, TO_FIRE) or (isinstance(event, events.Rearm) and event.held_s is None)
 
 
 def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - one case an event
