@@ -23,7 +23,7 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import OF_HALT, EntryCorrected, Halted, Remark, remark_kind, remark_record
+from experiments.session.remarks import OF_HALT, EntryCorrected, Halted, Noted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Answered, Asking, Interrupted, Outcome, Session, Step, step_after, step_record
 
@@ -106,19 +106,18 @@ class Beats:
         self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
 
     def beat(self) -> None:
-        """The timer beats."""
-        self._in_time = 0 if self._is_late() else self._in_time + 1
-        self._last_s = self._now()
+        """The timer beats. The time is read once: wherever this itself stands still, the next beat is late."""
+        now_s = self._now()
+        self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
+        self._last_s = now_s
         if self._in_time == _SETTLED:
-            self._alive_s = self._last_s
+            self._alive_s = now_s
 
     @property
     def alive_since_s(self) -> float:
         """Since when; infinity while it stands still, and until what was pressed meanwhile has come."""
-        return math.inf if self._is_late() or self._in_time < _SETTLED else self._alive_s
-
-    def _is_late(self) -> bool:
-        return self._now() - self._last_s > STANDSTILL_S
+        is_late = self._now() - self._last_s > STANDSTILL_S
+        return math.inf if is_late or self._in_time < _SETTLED else self._alive_s
 
 
 class LiveRun:
@@ -152,7 +151,7 @@ class LiveRun:
         self.disarming: list[threading.Thread] = []
         self.halt_unsaved = self.correction_unsaved = False
         self._answer_unsaved = ""
-        self.beats = Beats(clock.now)
+        self.beats, self._to_fire_s = Beats(clock.now), math.inf
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
 
@@ -216,6 +215,8 @@ class LiveRun:
         """Stand where an event leads; where it disarms, that begins when this is so, and before anything else."""
         before = moment.position
         self._position = judging.moved(moment, event)
+        if isinstance(event, events.Fire | events.Rearm):
+            self._to_fire_s = moment.now_s
         if isinstance(event, DISARMS) and (before.base in ARMED or isinstance(event, events.EmergencyStop)):
             self._disarm_beside()
         if before.paused_s is not None and self._position.paused_s is None:
@@ -314,6 +315,13 @@ class LiveRun:
             self._check()
             if self._position.state not in ARMED:
                 raise Held(self._position.why)
+
+    def allow_first_shot(self) -> None:
+        """As `allow_shot`; it pauses if the program stood still since the press: nobody expects that shot any more."""
+        if self.beats.alive_since_s > self._to_fire_s and self.offer(events.Pause()):
+            self._screen.trouble(judging.STOOD_STILL)
+            self.remark(Noted(trial=None, text=judging.STOOD_STILL))
+        self.allow_shot()
 
     def settle(self) -> None:
         """Wait for a disarm that another thread began, so that it cannot land after the next arming."""

@@ -407,6 +407,7 @@ class DeskGun:
         self._live.allow_shot()
         self._live.gun.arm()
         self._live.sleep(self._live.gun.status().ready_at_s)
+        self._live.allow_first_shot()
 
     def _first(self, shot: Shot) -> tuple[str, ShotReport]:
         """The first shot of a stimulus, and its date and time."""

@@ -27,6 +27,7 @@ from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
+from experiments.session.judging import STOOD_STILL
 from experiments.session.remarks import (
     HALTED_BEFORE,
     EntryCorrected,
@@ -208,6 +209,28 @@ def test_a_shot_that_was_asked_for_while_the_screen_stood_still_is_not_fired(cam
         assert "rendered" not in sitting.gun.words
         assert by_hand(sitting, events.Fire())
         assert [one.event for one in remarks(of_journal(sitting), Refused)] == ["fire", "fire"]
+
+
+@pytest.mark.parametrize("state", [S.PREPARING, S.REARMING])
+def test_nor_is_one_before_which_the_program_stood_still_on_its_way(state: State, tmp_path: Path) -> None:
+    with sat_at(state, tmp_path) as sitting:
+        looks(sitting, 10)
+        sitting.gun.hang = "arm"
+        assert sitting.live.offer(DUE[state])
+        assert sitting.gun.hangs.wait(PATIENCE_S)
+        sitting.clock.skip(9.0)
+        looks(sitting, 5)
+        fired = sitting.gun.words.count("rendered")
+        sitting.gun.release()
+        sitting.settle()
+        assert sitting.position.states == (state, S.PAUSED)
+        assert sitting.gun.words.count("rendered") == fired
+        assert sitting.gun.words[-1] == "disarmed"
+        assert sitting.window.troubles == [STOOD_STILL]
+        for event in (events.GoOn(), DUE[state]):
+            assert by_hand(sitting, event)
+        assert sitting.gun.words.count("rendered") == fired + 1
+        assert [one.text for one in remarks(of_journal(sitting), Noted)][-1] == STOOD_STILL
 
 
 def test_a_standstill_as_long_as_a_gun_may_be_away_keeps_no_shot(tmp_path: Path) -> None:

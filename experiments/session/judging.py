@@ -16,6 +16,9 @@ from experiments.tasks.questions import on_scale
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
+STOOD_STILL = (
+    "Nothing was fired: the program stood still after that was pressed. Look where the gun is, go on, and press again."
+)
 HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
