@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from heapq import nlargest
 from typing import TYPE_CHECKING
 
 from device import Gun, Identity
@@ -299,13 +300,38 @@ def begun_language(request: RunRequest, code: str) -> Language:
         raise NotAsItBegan(_journal_of(request), why, "--catalogues DIR") from error
 
 
-def begins_halted(where: Place, before: Contents | None) -> bool:
-    """Whether the last that a participant had in their hand ended by an emergency stop: practices, runs set aside too.
+LOOKED_BACK = 20
+"""So many journals, the last that were written, are looked at for the run before on a gun."""
 
-    Whatever they do next begins with a test shot, then. `before`: what their own journal holds, where they go on.
+
+def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
+    """Whether the last that a participant had in their hand ended by an emergency stop, or the last run on the gun.
+
+    Practices and runs set aside are such too. What is done next begins with a test shot, then. `before`: what their own
+    journal holds, where they go on.
     """
     last = ("", False) if before is None else last_word_on_gun(before)
     for path in where.folder.glob("*_journal*.jsonl"):
         with suppress(JournalError):  # one that cannot be read is named where it is to be used
             last = max(last, last if path == where.journal else last_word_on_gun(read_journal(path)))
-    return last[1]
+    return last[1] or (not is_simulated(gun) and _is_halted(gun, where))
+
+
+def _is_halted(gun: str, where: Place) -> bool:
+    """Whether the run before on a gun ended by an emergency stop: it may have been for a fault of the gun's."""
+    for path in nlargest(LOOKED_BACK, where.results.glob("sub-*/*_journal*.jsonl"), key=_written_ns):
+        with suppress(JournalError):
+            if path != where.journal and gun in _guns(contents := read_journal(path)):
+                return last_word_on_gun(contents)[1]
+    return False
+
+
+def _written_ns(path: Path) -> int:
+    with suppress(OSError):  # another console has just set it aside
+        return path.stat().st_mtime_ns
+    return 0
+
+
+def _guns(contents: Contents) -> set[str]:
+    """The guns of a run: that of its beginning, and those that it was resumed on."""
+    return {record.gun.name for record in contents.records if record.gun is not None}

@@ -288,8 +288,8 @@ def _tell(live: LiveRun, screen: Screen, changes: Iterable[str]) -> None:
 
 
 def _halted_before(position: RunPosition, place: Place, before: Contents | None, live: LiveRun) -> RunPosition:
-    """Where a run stands; what its participant did before it may owe it a test shot too, which is noted."""
-    if position.halted or not begins_halted(place, before):
+    """Where a run stands; what its participant or gun did before it may owe it a test shot too, which is noted."""
+    if position.halted or not begins_halted(place, before, live.gun_name):
         return position
     live.remark(Noted(trial=None, text=HALTED_BEFORE))
     return replace(position, halted=True)

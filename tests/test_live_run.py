@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from device import LimitError, LinkError
+from device import Identity, LimitError, LinkError
 from device.serial_gun.triggering import ARM_WITHIN_S
 from experiments.clock import STANDSTILL_S
 from experiments.config.setup import Setup
@@ -59,6 +59,7 @@ from tests.at_controls import (
     PATIENCE_S,
     PREFERENCE,
     Sitting,
+    WatchedGun,
     gated,
     kept,
     raw_answers,
@@ -1115,6 +1116,28 @@ def test_what_a_participant_does_after_an_emergency_stop_begins_with_a_test_shot
         assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * 2
     journal.rename(journal.with_name("sub-P01_task-direction_journal.aside-3.jsonl"))
     with sat(DIRECTION, tmp_path) as sitting:  # a test shot is the last word by now
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+
+
+@pytest.mark.parametrize(("gun", "owed"), [("7", True), ("8", False), ("simulated", False)])
+def test_the_next_participant_on_the_same_gun_begins_with_a_test_shot(
+    gun: str, owed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_now(serial: str) -> None:
+        identity = Identity(model="simulated" if serial == "simulated" else "shaker", version="2", serial=serial)
+        monkeypatch.setattr(WatchedGun, "identify", lambda _: identity, raising=False)
+
+    is_now("simulated" if gun == "simulated" else "7")
+    with sat_at(S.HALTED, tmp_path) as sitting:
+        sitting.press("Q")
+    (tmp_path / "sub-P01").rename(tmp_path / "sub-P02")  # they were somebody else
+    is_now(gun)
+    with sat(DIRECTION, tmp_path) as sitting:
+        assert (sitting.state is S.REARMING) is owed
+        sitting.to(S.PREPARING)
+        assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * owed
+    (tmp_path / "sub-P01").rename(tmp_path / "sub-P03")
+    with sat(DIRECTION, tmp_path) as sitting:  # a test shot was made, or another gun was used
         assert sitting.position.base in (S.SETTING, S.PREPARING)
 
 

@@ -24,7 +24,7 @@ class EntryCorrected:
     kind: Literal["corrected"] = "corrected"
 
 
-HALTED_BEFORE = "What this participant did before ended by an emergency stop: a test shot comes first."
+HALTED_BEFORE = "What this participant, or this gun, did before ended by an emergency stop: a test shot comes first."
 """What is noted of a run that begins so."""
 KEY_TIME_LOST = "key-time-lost"
 """The flag of a trial whose key counts and whose response time does not: what stamps keys had stood still."""
