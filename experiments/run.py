@@ -281,10 +281,11 @@ def _resume(
 
 
 def _tell(live: LiveRun, screen: Screen, changes: Iterable[str]) -> None:
-    """Say what is not as it was before, and have it on record."""
-    for changed in changes:
-        screen.trouble(changed)
-        live.remark(Noted(trial=None, text=changed))
+    """Say what is not as it was before, all of it at once, and have each on record."""
+    if texts := list(changes):
+        screen.trouble("\n".join(texts))
+    for text in texts:
+        live.remark(Noted(trial=None, text=text))
 
 
 def _halted_before(position: RunPosition, place: Place, before: Contents | None, live: LiveRun) -> RunPosition:

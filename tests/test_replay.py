@@ -495,7 +495,7 @@ def test_a_run_that_began_on_a_gun_is_not_gone_on_with_where_nothing_is_felt(
 class Sit(NamedTuple):
     """Sittings on a gun that has a name, and what was said of it."""
 
-    at: Callable[[str, Again, int], Path]
+    at: Callable[..., Path]
     told: list[str]
 
 
@@ -551,9 +551,9 @@ def sit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Sit:
     install(monkeypatch, tmp_path, NAMED_GUN, name="shaker", module="named_gun")
     told = list[str]()
 
-    def at(gun: str, again: Again, records: int) -> Path:
+    def at(gun: str, again: Again, records: int, *, noise: bool = False) -> Path:
         asked = replace(request("direction", tmp_path / "results", again), gun=f"shaker:{gun}")
-        return sat(asked, records, told)
+        return sat(replace(asked, options=ParticipantOptions(noise=noise)), records, told)
 
     return Sit(at=at, told=told)
 
@@ -571,6 +571,15 @@ def test_a_run_that_goes_on_on_another_gun_says_so_and_has_it_on_record(sit: Sit
         f"The gun was {was} until now, and is {now}" for was, now in (names, names[::-1])
     ]
     assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == sit.told
+
+
+@pytest.mark.slow
+def test_all_that_is_not_as_before_is_said_at_once_as_a_second_message_takes_the_place_of_the_first(sit: Sit) -> None:
+    sit.at("left", "ask", 8, noise=True)
+    journal = sit.at("right", "resume", 16)
+    (said,) = sit.told
+    assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == said.split("\n")
+    assert [line.partition(" ")[0] for line in said.split("\n")] == ["Masking", "The"]
 
 
 @pytest.mark.slow
