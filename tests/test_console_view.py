@@ -307,6 +307,18 @@ def test_a_pause_names_the_key_that_starts_a_lost_participants_screen_again() ->
     assert "Their screen is gone: S starts it again." in instruction(gone).detail
 
 
+def test_a_participants_screen_that_is_being_started_again_is_neither_gone_nor_to_be_started() -> None:
+    starting = ParticipantSeen(failure="killed by signal 9", starting=True)
+    here = seen(DIRECTION, Position(states=(State.ASKING,), step=ask(plan_of(DIRECTION).trials[0])))
+    asked = replace(here, participant=starting, about=replace(here.about, participant_keys=True))
+    told = "Their screen is being started again."
+    assert f"{told} Until it is there: Enter what the participant says: F or B." in instruction(asked).detail
+    for why in ("", "the participant's screen ended: killed by signal 9"):
+        paused = replace(asked.position, states=(State.ASKING, State.PAUSED), why=why)
+        does = f"{told} P goes on; until it is there you enter the answers."
+        assert instruction(replace(asked, position=paused)).detail == does
+
+
 def test_after_an_emergency_stop_nothing_comes_next_and_no_end_is_told() -> None:
     trial = plan_of(DIRECTION).trials[0]
     assert progress.coming(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(trial))))

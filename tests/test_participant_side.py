@@ -225,6 +225,7 @@ def notes(live: LiveRun) -> list[str]:
     return [word.text for _, word in live.history if isinstance(word, Noted)]
 
 
+@pytest.mark.slow
 def test_the_program_is_started_again_once_however_often_it_is_asked_for(tmp_path: Path) -> None:
     started: list[ParticipantLink] = []
     go = threading.Event()
@@ -235,17 +236,25 @@ def test_the_program_is_started_again_once_however_often_it_is_asked_for(tmp_pat
         return started[-1]
 
     first = ParticipantLink.start(command=(sys.executable, "-c", "pass"))
-    side = ParticipantSide(first, open_link, SETUP, rates=True, own_keys=False)
+    side, told = ParticipantSide(first, open_link, SETUP, rates=True, own_keys=False), list[Message]()
+
+    def starting() -> bool:
+        return [one.starting for one in told if isinstance(one, ParticipantSeen)][-1]
+
     try:
-        wait_for(lambda: first.failure is not None)
-        assert side.lost
-        side.restart()
-        assert not side.lost
-        side.restart()
-        go.set()
-        wait_for(lambda: not any(thread.name == "participant again" for thread in threading.enumerate()))
-        side.restart()
-        assert len(started) == 1
+        with sat(SETUP, tmp_path / "results") as sitting:
+            side.begin(sitting.live, told.append)
+            wait_for(lambda: first.failure is not None)
+            assert side.lost
+            side.restart()
+            assert not side.lost
+            side.restart()
+            assert starting()
+            go.set()
+            wait_for(lambda: not any(thread.name == "participant again" for thread in threading.enumerate()))
+            assert not starting()
+            side.restart()
+            assert len(started) == 1
     finally:
         side.close()
 

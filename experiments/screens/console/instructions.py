@@ -168,12 +168,12 @@ def either(words: Iterable[str]) -> str:
 
 
 def _asked_there(seen: Seen, awaited: str, here: str) -> str:
-    """What is awaited from the participant's screen, or that there is none any more."""
-    return (
-        phrase("Their screen is gone. {here} To start it again, pause first.", here=here)
-        if seen.participant_gone
-        else awaited
-    )
+    """What is awaited from the participant's screen, or that there is none any more, or none yet."""
+    if not seen.participant_gone:
+        return awaited
+    if seen.participant_starting:
+        return phrase("Their screen is being started again. Until it is there: {here}", here=here)
+    return phrase("Their screen is gone. {here} To start it again, pause first.", here=here)
 
 
 def _rating(seen: Seen) -> Instruction:
@@ -226,7 +226,12 @@ def _practised(seen: Seen, *, over: bool) -> str:
 
 
 def _paused(seen: Seen) -> Instruction:
-    if seen.position.why:
+    if seen.participant_starting:
+        detail = phrase(
+            "Their screen is being started again. {go_on_key} goes on; until it is there you enter the answers.",
+            go_on_key=seen.key("go on"),
+        )
+    elif seen.position.why:
         again = phrase(
             "{restart_key} starts it again. {go_on_key} goes on without it: you enter the answers.",
             restart_key=seen.key("restart"),

@@ -154,7 +154,8 @@ class ParticipantSide:
         focused, failure = self._link.focused, self._link.failure or ""
         has_keys = focused is not None and focused.on and not failure
         noise_off = self._noise is not None and not self._noise.on
-        self._tell(ParticipantSeen(focused=has_keys, failure=failure, noise_off=noise_off))
+        seen = ParticipantSeen(focused=has_keys, failure=failure, starting=self._starting, noise_off=noise_off)
+        self._tell(seen)
 
     def _noise_is(self, noise: messages.NoiseIs) -> None:
         """How the noise stands from now on: seen and on record, and said if it is off."""
@@ -344,6 +345,7 @@ class ParticipantSide:
             if not self.lost:
                 return
             self._starting = True
+        self._see()
         threading.Thread(target=self._restart, daemon=True, name="participant again").start()
 
     def _restart(self) -> None:

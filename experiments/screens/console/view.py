@@ -66,10 +66,14 @@ class GunSeen(Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantSeen(Message):
-    """Whether the participant's screen has the keys, or why it is gone; whether noise that is wanted does not play."""
+    """Whether the participant's screen has the keys, or why it is gone; whether noise that is wanted does not play.
+
+    `starting`: one that is gone is being started again.
+    """
 
     focused: bool = False
     failure: str = ""
+    starting: bool = False
     noise_off: bool = False
 
 
@@ -150,6 +154,11 @@ class Seen:
     def participant_gone(self) -> bool:
         """Whether there was a participant's screen, and is none now."""
         return self.participant is not None and bool(self.participant.failure)
+
+    @property
+    def participant_starting(self) -> bool:
+        """Whether it is being started again meanwhile."""
+        return self.participant is not None and self.participant.starting
 
     @property
     def here(self) -> Trial:
