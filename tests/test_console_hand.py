@@ -70,6 +70,10 @@ def test_what_fires_a_train_does_not_end_it_and_what_pauses_or_halts_it_does(tmp
         ("Key_Ampersand", "&", 10, "1"),  # a French keyboard
         ("Key_Eacute", "é", 11, "2"),
         ("Key_F", "f", 41, "F"),
+        ("Key_Left", "", 83, "4"),  # the number pad without Num Lock
+        ("Key_Insert", "", 90, "0"),
+        ("Key_Plus", "+", 86, "#43"),
+        ("Key_Left", "", 113, "left"),
         ("Key_Apostrophe", "'", 24, "#39"),  # where Q is on others
         ("Key_unknown", "ф", 38, "A"),
     ],

@@ -214,6 +214,8 @@ _BELOW_X = 8
 """So much less than X's are Windows' numbers; a Mac's Qt gives each key the number 1, which is no place."""
 _DIGITS = {10 + place: digit for place, digit in enumerate("1234567890")}
 """As the letters, for keyboards that have digits with Shift alone."""
+_PAD = dict(zip((79, 80, 81, 83, 84, 85, 87, 88, 89, 90), "7894561230", strict=True))
+"""The digits of the number pad, which without Num Lock are arrows and the like."""
 
 
 class Hears(Protocol):
@@ -338,13 +340,14 @@ def key_name(event: QKeyEvent) -> str:
 
     Both by their place on the keyboard, where that has something else there.
     """
-    key = event.key()
+    key, place = event.key(), event.nativeScanCode() + (_BELOW_X if sys.platform == "win32" else 0)
+    if place in _PAD:
+        return _PAD[place]
     named = _NAMES.get(QtCore.Qt.Key(key)) if key in set(_NAMES) else None
     if named is not None:
         return named
     if key < _ASCII_END and chr(key).isalnum():  # Qt's numbers of letters and digits are those of ASCII
         return chr(key)
-    place = event.nativeScanCode() + (_BELOW_X if sys.platform == "win32" else 0)
     is_letter = event.text().isalpha() and not event.text().isascii()
     return _DIGITS.get(place) or (_PLACES.get(place) if is_letter else None) or f"#{key}"
 
