@@ -136,6 +136,21 @@ def test_a_practice_in_rounds_says_at_its_end_whether_the_run_comes_next(*, reac
     assert ("The run itself comes next." in instruction(here).detail) is reached
 
 
+@pytest.mark.parametrize(("between_s", "interval"), [(0.0, 0), (0.0, 1), (20.0, 0)])
+def test_a_practice_without_breaks_says_how_a_round_went_as_the_next_one_begins(
+    between_s: float, interval: int
+) -> None:
+    missed = practised(reached=False)
+    design = missed.about.setup.config
+    breaks = design.breaks.model_copy(update={"between_sets_s": between_s})
+    setup = replace(missed.about.setup, config=design.model_copy(update={"breaks": breaks}))
+    step = prepare(missed.about.plan.trials[6 + interval])
+    here = replace(missed, about=replace(missed.about, setup=setup))
+    for state in (State.SETTING, State.PREPARING):
+        detail = instruction(replace(here, position=Position(states=(state,), step=step))).detail
+        assert detail.startswith("Round 1: 0 of 6 right; wanted: 80 %.\n") is (between_s == interval == 0)
+
+
 # what is never told
 
 

@@ -101,6 +101,24 @@ def test_a_break_is_counted_beside_what_is_typed(
     assert (terminal == "xterm") == ("\x1b" in shown)
 
 
+def test_a_practice_without_breaks_says_how_a_round_went_as_the_next_one_begins(
+    quick_configs: Path, tmp_path: Path
+) -> None:
+    config = quick_configs / "direction.toml"
+    rounds = '[practice]\nrepetitions = 1\nof = ["direction"]\nuntil_right = 1.0\nrounds = 2\n'
+    config.write_text(re.sub(r"\[practice\].*\n(?:[a-z].*\n)+", rounds, config.read_text()))
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1, "--practice"), tmp_path) as screen:
+        for trial in range(2):
+            screen.fire(trial + 1)
+            screen.wait_for("b = backward:", trial + 1)
+            assert "Round 1" not in screen.seen
+            screen.type("f")
+        screen.wait_for("\nRound 1: 1 of 2 right; wanted: 100 %.\n")
+        screen.wait_for("set 2")
+        screen.type("stop")
+        assert screen.end() == 130
+
+
 def test_a_run_whose_table_cannot_be_written_as_it_stops_says_that_nothing_is_lost(
     short_configs: Path, recoil: Recoil, tmp_path: Path
 ) -> None:

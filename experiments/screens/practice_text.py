@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan
+from experiments.design.plan import Plan, Trial
 from experiments.screens.phrases import phrase
 from experiments.session.history import History
 from experiments.session.practice_rounds import is_to_be_repeated, scores
@@ -28,3 +28,10 @@ def practice_text(design: DesignConfig, plan: Plan, told: History, *, over: bool
     if not (over and is_to_be_repeated(design, plan, told)):
         return said
     return phrase("{said} That was not reached: explain the task again, then practise anew.", said=said)
+
+
+def round_before_text(design: DesignConfig, plan: Plan, told: History, trial: Trial) -> str:
+    """The score of the round before, where another one opens and no break came between; else empty."""
+    if design.breaks.between_sets_s or not plan.opens_set(trial) or len(scores(design, plan, told)) >= trial.set:
+        return ""
+    return practice_text(design, plan, told, over=False)

@@ -20,7 +20,7 @@ from experiments.clock import Clock
 from experiments.live_run import LiveRun
 from experiments.record.tables import is_simulated
 from experiments.screens import texts
-from experiments.screens.practice_text import practice_text
+from experiments.screens.practice_text import practice_text, round_before_text
 from experiments.session import events
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
@@ -166,8 +166,10 @@ class TerminalScreen:
         told = self._live.history if self._live else ()
         place, again = texts.place_text(self._plan, step.trial), texts.again_text(told, step)
         track = texts.track_text(self._plan, told, step.trial)
+        before = round_before_text(self._design, self._plan, told, step.trial) if self._design is not None else ""
         said = "".join(f" {one}" for one in (f"{track}." if track else "", again) if one)
-        return f"\n{place}.{said}{texts.read_out_text(self._plan, step)}"
+        here = f"{place}.{said}{texts.read_out_text(self._plan, step)}"
+        return "".join(f"\n{line}" for line in (before, here) if line)
 
     def _level(self, step: Ask) -> str:
         """The levels that a procedure chose, where the experimenter may know them."""

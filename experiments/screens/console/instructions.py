@@ -10,7 +10,7 @@ from experiments.screens import texts
 from experiments.screens.console.keys import is_on_buttons
 from experiments.screens.console.view import Ended, Seen, method_text
 from experiments.screens.phrases import isolated, phrase
-from experiments.screens.practice_text import practice_text
+from experiments.screens.practice_text import practice_text, round_before_text
 from experiments.session.history import counting, entered_value
 from experiments.session.practice_rounds import is_to_be_repeated
 from experiments.session.states import State
@@ -100,12 +100,13 @@ def _turned(seen: Seen, *, damper: str, then: str) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Prepare):
         return _MOMENT
+    before = round_before_text(seen.about.setup.config, seen.about.plan, seen.told, step.trial)
     again = texts.again_text(seen.told, step)
     told = texts.read_out_text(seen.about.plan, step).strip()
     return Instruction(
         title=phrase("{turn}\nand hand it over", turn=texts.turn_text(step)),
         damper=damper.format(settings=texts.settings_text(step), method=method_text(seen.about, step.trial)),
-        detail="\n".join(filter(None, (told, again, then))),
+        detail="\n".join(filter(None, (before, told, again, then))),
     )
 
 
