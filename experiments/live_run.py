@@ -321,6 +321,7 @@ class LiveRun:
         if self.beats.alive_since_s > self._to_fire_s and self.offer(events.Pause()):
             self._screen.trouble(judging.STOOD_STILL)
             self.remark(Noted(trial=None, text=judging.STOOD_STILL))
+            raise Held("the program stood still")
         self.allow_shot()
 
     def settle(self) -> None:
@@ -421,8 +422,7 @@ class LiveRun:
         if isinstance(remark, EntryCorrected):
             self.correction_unsaved = True
             return CORRECTION_UNSAVED.capitalize()
-        text = getattr(remark, "text", "")
-        return f"Not saved: “{text}”" if text else ""
+        return f"Not saved: “{text}”" if (text := getattr(remark, "text", "")) else ""
 
     def _take_back(self, kept: Sequence[Remark]) -> None:
         """Show nothing that the disk refused. The session has read it: a run that goes by it ends."""

@@ -232,6 +232,8 @@ def test_nor_is_one_before_which_the_program_stood_still_on_its_way(state: State
             assert by_hand(sitting, event)
         assert sitting.gun.words.count("rendered") == fired + 1
         assert [one.text for one in remarks(of_journal(sitting), Noted)][-1] == STOOD_STILL
+        shots = [one.cause for one in remarks(of_journal(sitting), words.TestShot)]
+        assert shots == (["the program stood still", ""] if state is S.REARMING else [])
 
 
 def test_a_standstill_as_long_as_a_gun_may_be_away_keeps_no_shot(tmp_path: Path) -> None:
