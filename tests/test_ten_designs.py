@@ -97,6 +97,22 @@ def test_a_law_without_a_value_for_catch_trials_is_refused_with_what_they_are_ca
         check_laws(setup.config, laws_of(setup), [plan_of(setup.config, "P01", 1)])
 
 
+def test_a_number_for_a_catch_trial_is_the_least_that_may_be_said():
+    setup = changed("magnitude", trial={"catch": 3})
+    plan = plan_of(setup.config, "P01", 1)
+    person = SyntheticParticipant(setup.config, laws_of(setup), plan, setup.gun)
+    said = {trial.catch: person.answer(trial, "strength").value for trial in plan.trials}
+    assert said[True] == 0.000001 < said[False]
+
+
+@pytest.mark.parametrize(("name", "law"), [("preference", "appeal"), ("hurry", "diffusion")])
+def test_a_law_of_what_a_shot_does_is_refused_where_there_is_none(name, law):
+    felt = load(SyntheticAnswers, path_of(name).parent / f"synthetic/{name}-felt.toml")
+    design = changed(name, design="own", trial={"catch": 4}, order={"sets": 1}).config
+    with pytest.raises(ConfigError, match=rf"law = '{law}': it says what a shot does, and a catch trial"):
+        check_laws(design, felt)
+
+
 @pytest.mark.slow
 def test_catch_trials_are_falsely_felt_as_often_as_is_said():
     found = means("detection", "felt", lambda trial: trial.catch, 40)

@@ -210,8 +210,8 @@ class SyntheticParticipant:
                 return on_scale(mean + law.person_sd * self._own[name] + law.noise_sd * draws.normal(), question.scale)
             case PowerLaw():
                 spread = law.person_sd * self._own[name] + law.noise_sd * draws.normal()
-                number = law.scale * _number(trial, law.factor) ** law.exponent * math.exp(spread)
-                return on_scale(float(f"{number:.3g}"), question.scale)
+                felt = 0.0 if trial.catch else law.scale * _number(trial, law.factor) ** law.exponent
+                return on_scale(float(f"{felt * math.exp(spread):.3g}"), question.scale)
             case WorthLaw():
                 worths = [self._worth(law, level, name) for level in trial.intervals]
                 tie = law.tie * math.sqrt(math.prod(worths))

@@ -137,7 +137,10 @@ class RatingsLaw(Model):
 
 
 class PowerLaw(Model):
-    """Stevens: scale x^exponent, times log-normal factors of the person (modulus) and of the answer."""
+    """Stevens: scale x^exponent, times log-normal factors of the person (modulus) and of the answer.
+
+    Of a catch trial, in which nothing is felt, the least number.
+    """
 
     law: Literal["power"]
     factor: ColumnName
@@ -324,8 +327,8 @@ def _problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Itera
             yield from _habit_problems(design, law)
         case WorthLaw():
             yield from _worth_problems(design, question, law)
-        case DiffusionLaw():
-            yield from _diffusion_problems(design, question, law)
+        case AppealLaw() | DiffusionLaw():
+            yield from _felt_problems(design, question, law)
 
 
 def _common_problems(design: DesignConfig, question: QuestionConfig, law: Law) -> Iterator[str]:
@@ -403,7 +406,11 @@ def _worth_problems(design: DesignConfig, question: QuestionConfig, law: WorthLa
         yield f".tie = {law.tie:g}: no third answer is a tie; name one, or remove the key"
 
 
-def _diffusion_problems(design: DesignConfig, question: QuestionConfig, law: DiffusionLaw) -> Iterator[str]:
+def _felt_problems(design: DesignConfig, question: QuestionConfig, law: AppealLaw | DiffusionLaw) -> Iterator[str]:
+    if design.trial.catch:
+        yield f".law = {law.law!r}: it says what a shot does, and a catch trial (trial.catch) has none; use another law"
+    if not isinstance(law, DiffusionLaw):
+        return
     if question.correct != DIRECTION_FACTOR or set(question.named_answers) != set(DIRECTIONS):
         yield f".law = 'diffusion': it decides on a direction; correct must be {DIRECTION_FACTOR!r}"
     told = design.factors.get(INSTRUCTION_FACTOR)
