@@ -283,6 +283,22 @@ def test_nested_factors_are_described_and_not_tested():
     assert "factors that are nested, not crossed, are not tested here" in test.reason
 
 
+def test_levels_of_each_group_are_described_of_everybody_and_not_tested():
+    config = design(
+        factors={
+            "method": {"levels": ["asymmetric-1"]},
+            "grip": {"levels": ["one", "two"], "between": True},
+            "voltage_V": {"within": "grip", "levels": {"one": [1.0, 2.0], "two": [3.0, 4.0]}},
+        },
+        questions=RATED,
+    )
+    laws = {"questions": {"q": {"law": "ratings", "mean": {"all": 4.0}, "noise_sd": 1.0}}}
+    found = summarise(config, simulated(config, checked_table(SyntheticAnswers, laws, "laws.toml"), 6)).questions["q"]
+    (test,) = found.tests
+    assert (test.effect, found.left_out) == ("grip × voltage_V", ())
+    assert "factors that are nested, not crossed, are not tested here" in test.reason
+
+
 def test_nested_levels_have_no_exponent_and_the_report_says_why():
     config = design(
         factors={

@@ -25,13 +25,13 @@ def condition_tests(
     design: DesignConfig, question: QuestionConfig, people: pd.DataFrame, group: pd.Series | None
 ) -> Iterator[DesignTest]:
     """What differs between conditions, by as many factors as there are."""
-    if people.empty or design.trial.kind == "pair":
+    if design.trial.kind == "pair" or (people.empty and not nested_between(design)):
         return
     names = [str(name) for name in people.columns.names if name is not None]
     if not (names or design.between):
         return
     if question.kind == "number" and not with_levels_of_their_own(design, (*design.between, *names)):
-        yield from (_exponent(name, people) for name in _powers(people))
+        yield from (_exponent(name, people, nested=_is_nested(design, people)) for name in _powers(people))
     if why := _untested(design, question, people):
         yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
     elif len(names) == 1 and (group is None or question.kind == "ranking"):
@@ -60,7 +60,7 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
         return f"several factors between people are {instead}"
     if len(_sizes(people)) > MOST_FACTORS:
         return f"more than {MOST_FACTORS} factors within people are {instead}"
-    if _is_nested(people):
+    if _is_nested(design, people):
         return f"factors that are nested, not crossed, are {instead}"
     return _TOO_FEW if len(people) < 2 else ""
 
@@ -68,8 +68,13 @@ def _untested(design: DesignConfig, question: QuestionConfig, people: pd.DataFra
 _TOO_FEW = "fewer than two people have all conditions"
 
 
-def _is_nested(people: pd.DataFrame) -> bool:
-    return math.prod(_sizes(people)) != people.shape[1]
+def nested_between(design: DesignConfig) -> list[str]:
+    """The factors that are nested in one between people, so that nobody meets the conditions of another group."""
+    return [name for name, one in design.factors.items() if one.within in design.between and name not in design.adapted]
+
+
+def _is_nested(design: DesignConfig, people: pd.DataFrame) -> bool:
+    return bool(nested_between(design)) or math.prod(_sizes(people)) != people.shape[1]
 
 
 def with_levels_of_their_own(design: DesignConfig, names: Iterable[str]) -> list[str]:
@@ -179,9 +184,9 @@ def _powers(people: pd.DataFrame) -> list[str]:
     return [name for name in names if has_exponent(people.columns.unique(name).to_list())]
 
 
-def _exponent(name: str, people: pd.DataFrame) -> DesignTest:
+def _exponent(name: str, people: pd.DataFrame, *, nested: bool) -> DesignTest:
     """The mean exponent of the power law: each person's slope of log number over log level, tested against 0."""
-    if why := _OTHERS_DIFFER if _is_nested(people) else _TOO_FEW if len(people) < 2 else "":
+    if why := _OTHERS_DIFFER if nested else _TOO_FEW if len(people) < 2 else "":
         return DesignTest(name="exponent", effect=name, reason=why)
     means = people.T.groupby(level=name).mean()
     slopes = np.polyfit(np.log(means.index.to_numpy(dtype=np.float64)), means.to_numpy(dtype=np.float64), 1)[0]

@@ -17,7 +17,7 @@ import pandas as pd
 
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
-from analysis.summary.design_comparisons import condition_tests
+from analysis.summary.design_comparisons import condition_tests, nested_between
 from analysis.summary.pairs import paired_comparison
 from analysis.summary.question_results import ConditionSummary, QuestionSummary
 from analysis.summary.results import DesignSummary, Origin
@@ -118,8 +118,9 @@ def question_scores(design: DesignConfig, name: str, table: pd.DataFrame) -> Que
     scored = table.assign(score=scores).dropna(subset=["score"])
     real = scored if "stimulus" not in scored else scored[scored["stimulus"].astype(int) == 1]
     people = _complete(design, real)
-    tested = real["participant_id"] if design.trial.kind == "pair" else people.index  # pairs have scores, and no tests
-    left_out = sorted({*table["participant_id"].astype(str)} - {*tested.astype(str)})
+    untested = design.trial.kind == "pair" or nested_between(design)  # nobody lacks a condition of a test
+    there = real["participant_id"] if untested else people.index
+    left_out = sorted({*table["participant_id"].astype(str)} - {*there.astype(str)})
     return QuestionScores(scored=scored, real=real, people=people, left_out=tuple(left_out))
 
 
