@@ -127,6 +127,19 @@ def test_that_a_tie_counts_as_half_a_choice_is_said_where_there_may_be_one(
         assert (drawn in section.pictures[0].caption) == bool(said)
 
 
+def test_a_picture_is_told_by_the_scores_of_its_own_question() -> None:
+    asked = {"kind": "choice", "text": "?", "answers": ["first", "second"]}
+    factors = {"method": {"levels": ["a", "b", "c"]}}
+    twice = design(factors=factors, questions={"q": asked, "r": asked}, trial={"kind": "pair", "compare": "method"})
+    pairs = [("a", "b"), ("b", "c"), ("c", "a")]
+    answers = ("first", "second"), ("second", "first"), ("first", "second")
+    rows = [(f"P{i}", one, other, *said) for i, said in enumerate(answers) for one, other in pairs]
+    found = summarise(twice, pd.DataFrame(rows, columns=["participant_id", "method_1", "method_2", "q", "r"]))
+    for asked_of, section in zip("qr", pair_sections("test", found), strict=True):
+        (told,) = pair_sentences(found, found.questions[asked_of])
+        assert [one.alt for one in section.pictures] == [f"Scores with intervals. {told}"]
+
+
 def test_the_items_of_a_parameter_are_headed_by_its_name_and_unit() -> None:
     asked = {"kind": "choice", "text": "?", "answers": ["first", "second"]}
     factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [10.0, 13.0, 16.0]}}

@@ -50,7 +50,7 @@ def _section(name: str, asked: str, found: DesignSummary, of: PairedComparison) 
         f"{found.title.rstrip('.?!')}, {asked}: scores by Bradley and Terry with 95 % intervals; dashed: the mean of "
         "all."
     )
-    alt = " ".join(sentence for question in found.questions.values() for sentence in pair_sentences(found, question))
+    alt = " ".join(pair_sentences(found, found.questions[asked]))
     shown = Picture(stem=pairs_figure_of(name, asked), caption=caption, alt=f"Scores with intervals. {alt}")
     return Section(
         title=title,
