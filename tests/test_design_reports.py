@@ -427,7 +427,12 @@ def test_a_figure_of_hits_has_the_false_alarms_beside_them(varied, tmp_path, mon
     lines = {name: line for name, line in zip(names, handles, strict=True) if "false alarms" in name}
     shares = {"false alarms, one": 1 / 12, "false alarms, two": 2 / 12} if varied else {"false alarms": 3 / 24}
     assert {name: line.get_ydata()[0] / 100 for name, line in lines.items()} == pytest.approx(shares)
-    assert len({line.get_linestyle() for line in axes.lines if line.get_linestyle() != "None"}) > len(lines)
+    hits = {name: bars.lines[0] for name, bars in zip(names, handles, strict=True) if name not in lines}
+    looks = {name: (line.get_color(), line.get_marker()) for name, line in (hits | lines).items()}
+    assert len(set(looks.values())) == len(hits)
+    for name, line in lines.items():  # each as its hits, but that its mark is hollow
+        assert looks[name] == looks[name.replace("false alarms", "hits")]
+        assert line.get_markerfacecolor() == "white"
     assert axes.get_ylabel() == "hits and false alarms [%]"
     (picture,) = section_of(found).pictures
     assert "Drawn is the share of hits and of false alarms in catch trials (felt)." in picture.caption
@@ -445,5 +450,5 @@ def test_a_figure_of_functions_of_yes_has_the_false_alarms(tmp_path, monkeypatch
     for axes, share in zip(drawn[0].axes, (9 / 24, 3 / 12, 6 / 12), strict=True):
         assert 100 * share in [line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1]
     (section,) = threshold_sections("test", found)
-    assert "Dashed: false alarms in catch trials, straight across." in section.pictures[0].caption
+    assert "Straight across: false alarms in catch trials." in section.pictures[0].caption
     assert section.pictures[0].alt.endswith(". False alarms: 37.5 %.")

@@ -333,9 +333,27 @@ def bounded(axes: Axes, high: float) -> None:
     axes.spines["left"].set_bounds(0.0, high)
 
 
-def reference_line(axes: Axes, height: float, text: str, colour: str = GREY) -> None:
+def level_line(axes: Axes, height: float, i: int, of: int, label: str | None = None) -> None:
+    """A dotted line across in the colour of the method at place `i`, with its mark, hollow, apart from others."""
+    axes.plot(
+        [0.0, (i + 0.5) / of, 1.0],
+        [height] * 3,
+        color=method_colour(i),
+        linestyle=":",
+        linewidth=1.2,
+        marker=method_marker(i),
+        markevery=[1],
+        markersize=5.0,
+        mfc="white",
+        label=label,
+        transform=axes.get_yaxis_transform(),
+        zorder=3.5,
+    )
+
+
+def reference_line(axes: Axes, height: float, text: str) -> None:
     """A dashed line across, named at its right."""
-    axes.axhline(height, color=colour, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    axes.axhline(height, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     axes.annotate(
         text,
         xy=(1.0, height),

@@ -17,6 +17,7 @@ from analysis.report.figures.style import (
     drawn,
     drawn_name,
     legend_columns,
+    level_line,
     light_grid,
     method_colour,
     method_line,
@@ -33,7 +34,7 @@ from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words
 
 _ACROSS = 2
-_ALARMS = "false alarms"
+_HITS, _ALARMS = "hits", "false alarms"
 _LEGEND_COLUMNS = 3
 _TICKS = 10
 """So many levels have a tick each."""
@@ -104,7 +105,7 @@ def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary
     numeric = all(isinstance(level, float) for level in places)
     alarms = question.false_alarms
     aside = [cell for cell in alarms if factor is None or factor in cell.levels]
-    series = _series(cells, factor, found, "hits" if alarms else "")
+    series = _series(cells, factor, found, _HITS if alarms else "")
     series |= _series(aside, factor, found, _ALARMS)
     logarithmic = question.kind == "number" and numeric and min(places.values()) > 0
     for i, (label, some) in enumerate(series.items()):
@@ -113,9 +114,10 @@ def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary
         shifted = [replace(mark, x=_shifted(mark.x, off, [*places.values()], numeric, logarithmic)) for mark in marks]
         _draw_series(axes, shifted, i, label, joined=numeric)
     across = [] if aside else alarms  # catch trials that have no level along the axis
+    marked = [label.replace(_HITS, _ALARMS, 1) for label in series]  # the marks of whose hits are drawn
     for i, (label, (cell,)) in enumerate(_series(across, factor, found, _ALARMS).items(), start=len(series)):
-        share = 100 * (cell.right or 0) / cell.trials
-        axes.axhline(share, color=method_colour(i), linestyle=method_line(i), linewidth=1.2, label=label)
+        share, place = 100 * (cell.right or 0) / cell.trials, marked.index(label) if label in marked else i
+        level_line(axes, share, place, len(series) + len(across), label)
     if question.kind == "number":
         _logarithmic(axes, both=logarithmic)
     labels = found.labels.get(factor or "", {})

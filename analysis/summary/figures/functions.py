@@ -14,11 +14,11 @@ from matplotlib.ticker import MaxNLocator
 from analysis.psychometric.fit import Credible
 from analysis.psychometric.people import PersonFit, ShareAtLevel, mean_curve
 from analysis.report.figures.style import (
-    GREY,
     drawn,
     drawn_name,
     have_room,
     legend_below,
+    level_line,
     light_grid,
     method_colour,
     method_line,
@@ -114,12 +114,15 @@ def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
 def _draw(axes: Axes, curves: Sequence[_Curve], levels: FloatArray) -> None:
     light_grid(axes)
     apart = (levels[-1] - levels[0]) * min(_ASIDE, _ALL_ASIDE / max(1, len(curves) - 1))
-    alarms: dict[float, list[str]] = {}
+    alarms: dict[float, list[int]] = {}
     for i, curve in enumerate(curves):
         if curve.alarms is not None:
-            alarms.setdefault(curve.alarms, []).append(method_colour(i))
-    for share, colours in alarms.items():  # grey where it is of several curves, or of all
-        reference_line(axes, 100 * share, "", colours[0] if len(alarms) > 1 and len(colours) == 1 else GREY)
+            alarms.setdefault(curve.alarms, []).append(i)
+    for share, (i, *others) in alarms.items():  # grey where it is of several curves, or of all
+        if len(alarms) == 1 or others:
+            reference_line(axes, 100 * share, "")
+        else:
+            level_line(axes, 100 * share, i, len(curves))
     for i, curve in enumerate(curves):
         colour, aside = method_colour(i), apart * (i - (len(curves) - 1) / 2)  # marks of several would hide each other
         if curve.shares is not None:

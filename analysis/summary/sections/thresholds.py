@@ -212,16 +212,16 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
         for one in of.conditions[:_TOLD]
         if (share := alarm_share(one.people)) is not None
     ]
-    unknown = "false alarms in catch trials, straight across" if alarms else ""
+    unknown = "Straight across: false alarms in catch trials" if alarms else ""
     chosen = of.share == "chosen" and isinstance(of.standard, float)
-    dashed = "the standard" if chosen else "chance" if of.guess is not None else unknown
+    line = "Dashed: the standard" if chosen else "Dashed: chance" if of.guess is not None else unknown
     group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
     aside = ", those of one level side by side" if len(of.conditions) > 1 else ""
     caption = (
         f"{found.title.rstrip('.?!')}, {asked}: {group}a panel a participant. Points: shares with exact 95 % "
         f"intervals, their area the number of trials{aside}; of many levels neighbours are joined. Lines and bands: "
         f"fitted curves with 95 % credible bands; bars at the foot: {_measure(of)} with its interval, left out where "
-        f"it is not within the levels.{f' Dashed: {dashed}.' if dashed else ''}{rest}"
+        f"it is not within the levels.{f' {line}.' if line else ''}{rest}"
     )
     said = "; ".join(threshold_words(found, of)) or "nobody's fit"
     said += f". False alarms: {'; '.join(alarms)}" if alarms else ""
