@@ -17,6 +17,7 @@ from experiments.session.states import (
     BACK,
     BENEATH,
     TABLE,
+    WHY_NOT,
     Change,
     No,
     Position,
@@ -99,6 +100,10 @@ def test_every_state_is_reached_and_a_pause_lies_beneath_a_correction_and_never_
 
 def test_what_is_handed_down_is_so_from_a_correction_alone() -> None:
     assert {state for changes in TABLE.values() for state in changes if changes[state] == BENEATH} == {S.CORRECTING}
+
+
+def test_what_is_awaited_is_called_an_answer_whatever_is_asked_for() -> None:
+    assert {WHY_NOT[state] for state in (S.ASKING, S.RATING, S.DESCRIBING)} == {"The answer is awaited."}
 
 
 def test_the_committed_page_says_what_the_table_says() -> None:

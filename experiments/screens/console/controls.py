@@ -14,13 +14,13 @@ from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import FLAG_RULE, typed_line, typed_rating
+from experiments.screens.texts import FLAG_RULE, entry_name, typed_line, typed_rating
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
 from experiments.session.history import chosen_levels, entered_value
 from experiments.session.judging import NOTHING_TO_REPEAT, NOTHING_TO_UNDO, REARM_HELD_S
 from experiments.session.states import ARMED, EMERGENCY, Position, State
-from experiments.session.steps import Ask, Asking, Rate, what
+from experiments.session.steps import Ask, Asking, Rate
 from experiments.synthetic.answers import SyntheticParticipant
 from experiments.tasks.questions import AnswerValue, Choice
 
@@ -293,7 +293,7 @@ class Controls:
                 self._live.offer(events.Note(text=f"correction: {typed}", trial=entry.trial))
         step, typed = self.drawn.step, typed_line(self._view.take_typed())
         if typed and isinstance(step, Asking):
-            self._live.offer(events.Note(text=f"{what(step)}: {typed}", trial=step.trial))
+            self._live.offer(events.Note(text=f"{entry_name(self._live.history, step)}: {typed}", trial=step.trial))
 
     def _drawn_s(self, response: str) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""

@@ -108,13 +108,9 @@ class TextFields:
             "line": self.line,
         }
         self._ends, self._question = widgets.text_label("quiet"), widgets.text_label("quiet")
-        for field, name, how in (
-            (self.rating, "rating", phrase("type a number, Enter saves")),
-            (self.words, "description", phrase("type the participant's words, Enter saves")),
-            (self.line, "line of text", ""),
-        ):
-            field.setAccessibleName(name)
-            field.setPlaceholderText(how)
+        self.rating.setPlaceholderText(phrase("type a number, Enter saves"))
+        self.words.setPlaceholderText(phrase("type the participant's words, Enter saves"))
+        self.line.setAccessibleName("line of text")
         self.pages = QtWidgets.QStackedWidget()
         for page in (QtWidgets.QWidget(), widgets.column(self._ends, self.rating), widgets.column(self.words)):
             self.pages.addWidget(page)
@@ -134,6 +130,7 @@ class TextFields:
         if isinstance(step := position.correcting or position.step, Rate):
             self._ends.setText(texts.ends_text(step))
         for field in (self.rating, self.words):
+            field.setAccessibleName(step.question if isinstance(step, Asking) else "")
             field.setText(draft or said)
             if not draft:
                 field.selectAll()
