@@ -151,6 +151,10 @@ def test_a_shot_that_does_not_break_away_is_named_and_never_counted_as_guessing(
 def test_the_page_says_that_it_predicts_and_what_it_assumes(done: tuple[Path, Any]) -> None:
     out, found = done
     page = (out / "report.md").read_text(encoding="utf-8")
+    assert page.count("Design search") == 1
+    assert max(one["shooting_rate_Hz"] for one in found["front"]) > 15
+    assert "Shown is what shoots at up to 15 Hz, 3 times the bound: what is faster is hardly felt." in page
+    assert "From the front up to 15 Hz; all" in page
     assert "predicted by a model" in page
     assert "exponent" in page
     assert "leak" in page

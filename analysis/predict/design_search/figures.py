@@ -22,6 +22,8 @@ from analysis.stats.arrays import FloatArray
 BOTH = "both directions alike"
 MARKERS = "os^Dv<>"
 FAINT, SOFT = "#d6d6d6", "#9db8cc"
+FASTEST = 3.0
+"""Times the bound: what is faster is hardly felt, and stands in `design.json` alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,11 +94,10 @@ def _point(axes: Axes, mark: Mark, colour: str, marker: str, size: float) -> Non
 
 
 def _scales(axes: Axes, bound_Hz: float, designs: Designs) -> None:
-    """Rates from below the bound to three times it: what is faster is hardly felt."""
-    widest = 3.0 * bound_Hz
+    """Rates from below the bound to a few times it."""
     rates_Hz = designs.shooting_rate_Hz[designs.proposable & np.isfinite(designs.predicted)]
     slowest = float(rates_Hz.min()) if rates_Hz.size else 0.0
-    axes.set_xlim(max(0.0, min(slowest, bound_Hz) - 0.2), widest)
+    axes.set_xlim(max(0.0, min(slowest, bound_Hz) - 0.2), FASTEST * bound_Hz)
     axes.set_ylim(48.0, 101.0)
     axes.set_xlabel("highest shooting rate [Hz]")
     axes.set_ylabel("right about a forward shot,\npredicted [%]")

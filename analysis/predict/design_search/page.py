@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from analysis.predict.design_search.choice import ABOVE, BELOW, REACHED, Designs
-from analysis.predict.design_search.figures import BOTH, figure_critical, figure_maps, figure_trade
+from analysis.predict.design_search.figures import BOTH, FASTEST, figure_critical, figure_maps, figure_trade
 from analysis.predict.design_search.results import (
     BestDesign,
     Critical,
@@ -89,9 +90,6 @@ def _others(critical: Critical, friction_N: float) -> Iterator[str]:
 
 
 FRONT_ROWS = 12
-FASTEST = 3.0
-"""Times the bound: what is faster is in `design.json` alone."""
-
 
 STATUS_WORDS = {
     "no-break-away": "do not move the magnet (no percept)",
@@ -103,7 +101,7 @@ STATUS_WORDS = {
 def sections(found: DesignSearch, designs: Designs, figures: Path) -> tuple[Section, ...]:
     """The page's sections; their figures are written."""
     return (
-        in_short(found),
+        replace(in_short(found), title="In short"),
         _best(found),
         _trade(found, designs, figures),
         _maps(found, figures),
@@ -233,22 +231,28 @@ def _cells(one: DrivePrediction) -> tuple[str, ...]:
 def _trade(found: DesignSearch, designs: Designs, figures: Path) -> Section:
     front = found.front
     figure_trade(found, designs, figures / "trade")
-    rows = tuple(_cells(one) for one in _spread(front, FASTEST * found.rate_above_Hz))
+    fastest_Hz = FASTEST * found.rate_above_Hz
+    rows = tuple(_cells(one) for one in _spread(front, fastest_Hz))
+    beyond = any(one.shooting_rate_Hz > fastest_Hz for one in front)
+    up_to = f" up to {fastest_Hz:g} Hz" if beyond else ""
+    faster = f" Shown is what shoots at{up_to}, {FASTEST:g} times the bound: what is faster is hardly felt."
     return Section(
         title="The trade: felt against fast",
         paragraphs=(
             "A design is on the front if no other within the limits is both faster and felt better. More friction "
             "takes the landing's blow away and the speed with it. designs.csv has every design with its status, the "
-            "limit that it breaks, its rate and its prediction.",
+            f"limit that it breaks, its rate and its prediction.{faster if beyond else ''}",
         ),
         pictures=(
             Picture(
                 stem="trade",
-                caption="Predicted share of right answers over the highest shooting rate; 95 % limits of the fit",
+                caption=f"Predicted share of right answers over the highest rate{up_to}; band: 95 % limits of the fit",
                 alt="Cloud of designs with their Pareto front, the gun's own methods and the best design",
             ),
         ),
-        tables=(Table(caption=f"From the front; all {len(front)} are in design.json", header=_HEADER[1:], rows=rows),),
+        tables=(
+            Table(caption=f"From the front{up_to}; all {len(front)} are in design.json", header=_HEADER[1:], rows=rows),
+        ),
     )
 
 
