@@ -10,7 +10,13 @@ import pytest
 
 from analysis.predict.threshold_plan.page import plan_in_short, sections_of_plan
 from analysis.predict.threshold_plan.people import SyntheticPeople, answers_by, procedures
-from analysis.predict.threshold_plan.run import ThresholdPower, ThresholdRequest, procedures_of, threshold_power
+from analysis.predict.threshold_plan.run import (
+    ThresholdPower,
+    ThresholdRequest,
+    people_fitted,
+    procedures_of,
+    threshold_power,
+)
 from experiments.config.door import ConfigError
 from tests.conftest import Recoil
 
@@ -54,8 +60,10 @@ def test_each_procedure_and_number_of_trials_has_its_figures(found: ThresholdPow
     assert set(found.best) == {"10", "20"}
     assert all(one.width > 0 and one.rms_error >= abs(one.bias) for one in found.procedures)
     assert found.procedures[0].minutes == pytest.approx(10 * 17 / 60)
-    again = threshold_power(ThresholdRequest(config="voltages", trials="20", people=6))
+    told: list[str] = []
+    again = threshold_power(request := ThresholdRequest(config="voltages", trials="20", people=6), told.append)
     assert again.to_frame().shape == (4, 9)
+    assert len(told) == people_fitted(request) == 24
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from analysis.predict.threshold_plan.run import (
     ProcedurePower,
     ThresholdPower,
     ThresholdRequest,
-    procedures_of,
+    people_fitted,
     threshold_power,
 )
 from analysis.report import apa
@@ -34,7 +34,7 @@ _TARGET = 0.8
 def procedure_errors(request: BenchRequest) -> Measured:
     """What synthetic people's thresholds are off by, by procedure and trials."""
     plan = ThresholdRequest(config=_THRESHOLD_DESIGN, trials=_TRIALS, people=request.people, seed=request.seed)
-    with request.progress("bench procedures", len(procedures_of(plan.config))) as tell:
+    with request.progress("bench procedures", people_fitted(plan)) as tell:
         found = threshold_power(plan, tell)
     text = (
         f"The design is `{_THRESHOLD_DESIGN}`, with {found.people} synthetic people a procedure. The error is the "

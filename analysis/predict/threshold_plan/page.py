@@ -12,7 +12,7 @@ from analysis.predict.threshold_plan.run import (
     ProcedurePower,
     ThresholdPower,
     ThresholdRequest,
-    procedures_of,
+    people_fitted,
     threshold_power,
 )
 from analysis.report import apa, placing
@@ -37,7 +37,7 @@ _FIGURE = "figure-thresholds"
 def threshold_plan(request: ThresholdRequest, out: Path, progress: Progress) -> ThresholdPower:
     """Simulate, write `power.json`, report and figure into `out`; what was found is returned."""
     with placing.results_in(out, placing.POWER_FILE) as part, labelled({}):
-        with progress("power", len(procedures_of(request.config))) as tell:
+        with progress("power", people_fitted(request)) as tell:
             found = threshold_power(request, tell)
         storage.write_whole(part / placing.POWER_FILE, as_json(found))
         write_page(part, f"Planned threshold: {found.title}", sections_of_plan(found, part / "figures"))

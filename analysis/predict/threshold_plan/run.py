@@ -112,6 +112,11 @@ def procedures_of(config: str) -> tuple[str, ...]:
     return () if planned is None else procedures(planned.share)
 
 
+def people_fitted(request: ThresholdRequest) -> int:
+    """How many people `threshold_power` will fit, and tell of one by one. `ConfigError` as there."""
+    return len(procedures_of(request.config)) * len(_trials(request)) * request.people
+
+
 def threshold_power(request: ThresholdRequest, tell: Callable[[str], None] = untold) -> ThresholdPower:
     """Simulate people at each procedure, and fit them as the analysis will. `ConfigError`: nothing to be planned."""
     planned = _planned(load_setup(find(request.config)))
@@ -119,11 +124,10 @@ def threshold_power(request: ThresholdRequest, tell: Callable[[str], None] = unt
         raise ConfigError(
             f'{request.config}: no question with a success over numbers is answered by law "psychometric"'
         )
-    trials = whole_numbers(request.trials, "--trials", _FEWEST, _MOST)
+    trials = _trials(request)
     found = []
     for procedure in procedures(planned.share):
-        found += list(_of_procedure(procedure, planned, trials, request))
-        tell(procedure)
+        found += list(_of_procedure(procedure, planned, request, tell))
     law = planned.law
     return ThresholdPower(
         experiment=planned.design.design,
@@ -144,6 +148,10 @@ def threshold_power(request: ThresholdRequest, tell: Callable[[str], None] = unt
         provenance=provenance(),
         own_rule=_own_rule(planned) is not None,
     )
+
+
+def _trials(request: ThresholdRequest) -> list[int]:
+    return whole_numbers(request.trials, "--trials", _FEWEST, _MOST)
 
 
 def _best(found: Sequence[ProcedurePower], trials: int) -> str:
@@ -180,8 +188,9 @@ def _own_sd(planned: _Planned) -> float:
 
 
 def _of_procedure(
-    procedure: str, planned: _Planned, trials: Sequence[int], request: ThresholdRequest
+    procedure: str, planned: _Planned, request: ThresholdRequest, tell: Callable[[str], None]
 ) -> Iterator[ProcedurePower]:
+    trials = _trials(request)
     own = generator(request.seed, "threshold power", "people").normal(size=request.people) * _own_sd(planned)
     people = SyntheticPeople(
         thresholds=planned.threshold * np.exp(own),
@@ -195,7 +204,10 @@ def _of_procedure(
     priors = priors_of(planned.design, np.array(planned.levels))
     known = planned.guess if planned.share == "right" else None
     for count in trials:
-        fits = [_fit(answers, place, count, known, priors) for place in range(request.people)]
+        fits = []
+        for place in range(request.people):
+            fits.append(_fit(answers, place, count, known, priors))
+            tell(f"{procedure}, {count} trials")
         yield _power(procedure, planned, count, fits, people.thresholds)
 
 
