@@ -217,6 +217,7 @@ def test_speed_beside_pingouin(soak: Soak) -> None:
 COLD = f"""
 import time
 import numpy as np
+import scipy.special
 from analysis import rm_anova, rm_tukey_hsd
 tables = np.random.default_rng(1).normal(size=({SETS}, 14, 3)) + np.array([0.0, 0.5, 1.0])
 start = time.perf_counter()
