@@ -34,7 +34,9 @@ def git_commit() -> str:
 
 
 def _git(checkout: Path, *words: str) -> str:
-    done = subprocess.run(["git", *words], cwd=checkout, capture_output=True, text=True, timeout=10, check=True)
+    """What git says; it locks nothing, as one that is killed with its run would leave the checkout locked."""
+    command = ["git", "--no-optional-locks", *words]
+    done = subprocess.run(command, cwd=checkout, capture_output=True, text=True, timeout=10, check=True)
     return done.stdout.strip()
 
 
