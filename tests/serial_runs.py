@@ -48,6 +48,18 @@ def hasty(folder: Path, hand_over_s: float = 0.3) -> Path:
     return config
 
 
+def long_trains(folder: Path, exposure_s: float, **more: float) -> Path:
+    """Experiment 2 with trains felt for so long in the mean, a second for whatever else, and more keys."""
+    config, people = folder / "preference.toml", folder / "synthetic" / "preference.toml"
+    quick = {"opening_s": 1.0, "hand_over_s": 1.0, "answer_s": 1.0}
+    for path, values in ((config, quick | more), (people, {"exposure_s": exposure_s})):
+        for key, value in values.items():
+            text, found = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", path.read_text(), flags=re.MULTILINE)
+            assert found == 1, key
+            path.write_text(text)
+    return config
+
+
 def one_run(config: Path, results: Path, gun: str, code: str, again: Any) -> Place:
     """A person's run, on a clock as fast as the twin lives."""
     setup = load_setup(str(config))

@@ -1,6 +1,5 @@
 """The serial gun's full figures: 10,000 trials on a bad line, as many with a gun that lies, and its clock."""
 
-import re
 import statistics
 import time
 from collections import Counter
@@ -12,7 +11,7 @@ from device.serial_gun.gun import MAX_SPEED
 from device.serial_gun.link import WATCHDOG_S
 from experiments.record.journal import read_journal
 from tests.forger import ShotLiar, a_lying_twin
-from tests.serial_runs import SPEED, TROUBLES, check, hasty, of_trains, one_run, run_all
+from tests.serial_runs import SPEED, TROUBLES, check, hasty, long_trains, of_trains, one_run, run_all
 from tests.twins import Troubles, a_pair, a_twin
 
 pytestmark = pytest.mark.soak
@@ -49,9 +48,7 @@ def test_the_clock_after_fifty_exchanges_with_jitter(tmp_path, soak):
 
 
 def test_the_shots_of_trains_in_real_time(tmp_path, quick_configs, soak):
-    config = quick_configs / "preference.toml"
-    text = re.sub(r"exposure_s = [\d.]+", "exposure_s = 20.0", config.read_text())
-    config.write_text(re.sub(r"\b(instruction|hand_over|rating|description)_s = [\d.]+", r"\1_s = 1.0", text))
+    config = long_trains(quick_configs, exposure_s=20.0)
     line = Troubles(latency_s=0.001, jitter_s=0.004)
     with a_twin(tmp_path, line, speed=1.0, drift_ppm=80.0) as (twin, socket):
         done = one_run(config, tmp_path / "results", f"serial:{socket.address}", "P01", "ask")

@@ -3,7 +3,6 @@
 import itertools
 import json
 import random
-import re
 import signal
 import statistics
 import subprocess
@@ -21,7 +20,7 @@ from experiments.record.journal import read_journal
 from tests import armed_host
 from tests.conftest import RECOIL
 from tests.forger import a_lying_pair
-from tests.serial_runs import of_trains
+from tests.serial_runs import long_trains, of_trains
 from tests.twins import a_shot, a_twin, disarmings_of
 
 pytestmark = pytest.mark.soak
@@ -84,17 +83,6 @@ def plugged(folder):
         program.wait(30)
 
 
-def long_trains(folder):
-    """Experiment 2 with four shots a second, until the most shots."""
-    config = folder / "preference.toml"
-    text = re.sub(r"repeat_every_s = [\d.]+", "repeat_every_s = 0.25", config.read_text())
-    text = re.sub(r"max_shots_per_trial = \d+", f"max_shots_per_trial = {TRAIN_SHOTS}", text)
-    text = re.sub(r"max_planned_s = [\d.]+", "max_planned_s = 86400.0", text)
-    text = re.sub(r"exposure_s = [\d.]+", "exposure_s = 2000.0", text)
-    config.write_text(re.sub(r"\b(instruction|hand_over|rating|description)_s = [\d.]+", r"\1_s = 1.0", text))
-    return config
-
-
 def run_to_its_end(words):
     """A run that is gone on with whenever it stops for want of a gun."""
     for more in ([], *([["--resume"]] * 50)):
@@ -105,7 +93,9 @@ def run_to_its_end(words):
 
 
 def test_trains_under_load_lose_few_shots_to_the_watchdog(tmp_path, quick_configs, soak):
-    config = long_trains(quick_configs)
+    config = long_trains(
+        quick_configs, exposure_s=2000.0, repeat_every_s=0.25, max_shots=TRAIN_SHOTS, max_planned_s=86400.0
+    )
     with plugged(tmp_path) as gun, load(BUSY):
         words = [str(RECOIL), "run", str(config), "--participant", "P01", "--screen", "synthetic", "--seed", "3"]
         words += ["--gun", gun, "--results", str(tmp_path / "results")]
