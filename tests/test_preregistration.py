@@ -33,9 +33,10 @@ from experiments.run_request import RunRequest
 from experiments.screens.console.people import changed_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
+from experiments.study.changes import plain_value
 from experiments.study.folders import PlaceError, freeze_status, open_study, overview
 from experiments.study.new_study import new_study
-from experiments.study.preregistration import PreregistrationError, plain_value, run_warnings
+from experiments.study.preregistration import PreregistrationError, run_warnings
 from experiments.study.study import Facts
 from tests.conftest import Recoil, refused
 from tests.designs import changed

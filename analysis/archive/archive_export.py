@@ -43,8 +43,8 @@ from experiments.record.journal import Contents, JournalError
 from experiments.record.provenance import recoil_version
 from experiments.record.shots_table import SHOTS
 from experiments.record.tables import DataKind
+from experiments.study.changes import Files
 from experiments.study.folders import PlaceError
-from experiments.study.preregistration import Files
 from experiments.study.register import REGISTER_FILE
 from experiments.study.study import Member
 

@@ -13,7 +13,8 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.methods_section import joined_by_and, methods_section
 from experiments.design.planned import runs_of_groups
-from experiments.study.preregistration import KeyChange, Preregistration, plain_value
+from experiments.study.changes import KeyChange, plain_value
+from experiments.study.preregistration import Preregistration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

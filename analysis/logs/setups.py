@@ -13,7 +13,7 @@ from device.messages import first_few, how_many
 from experiments.record import journal
 from experiments.record.journal import JournalError
 from experiments.record.tables import DataKind
-from experiments.study.preregistration import Files, changed_keys, plain_value
+from experiments.study.changes import Files, changed_keys, plain_value
 
 _NAMED = 20
 """So many people, and so many keys, are named."""

@@ -19,15 +19,14 @@ from experiments.config.door import read_toml
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
 from experiments.record.provenance import recoil_version
+from experiments.study.changes import FileValues, changed_keys
 from experiments.study.folders import freeze_status
 from experiments.study.preregistration import (
     SHORT,
     Chain,
-    FileValues,
     FreezeStatus,
     Preregistration,
     as_frozen,
-    changed_keys,
     changes_of_run,
     read_chain,
 )

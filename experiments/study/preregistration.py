@@ -24,35 +24,19 @@ from experiments.config.setup import Setup, sha256
 from experiments.design.config import DesignConfig
 from experiments.record import storage
 from experiments.record.lines import strict_json
+from experiments.study.changes import Files, FileValues, KeyChange, changed_keys, without_reasons
 
 STUDY_FILE = "study.toml"
 JOURNALS = "results/sub-*/sub-*_journal.jsonl"
 """Where the journals of a study lie, below its folder."""
 _NAME = re.compile(r"preregistration-([1-9][0-9]{0,5})\.(json|md)")
 _RESTORE = "put the original back, from a copy"
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 SHORT = 12
 """So many digits of a hash are enough for people."""
-
-FileValues = Mapping[str, JsonValue]
-Files = Mapping[str, FileValues]
-"""The files of a study, by their place beside `study.toml`, as plain values."""
 
 
 class PreregistrationError(RecoilError):
     """A preregistration that cannot be written, or trusted; the message says what to do."""
-
-
-class KeyChange(Model):
-    """A key of a file that differs: what was frozen and what it is now; `None` where there is nothing."""
-
-    file: str
-    key: str
-    frozen: JsonValue
-    now: JsonValue
-
-    def __str__(self) -> str:
-        return f"{self.file}: {self.key}: frozen {plain_value(self.frozen)}, now {plain_value(self.now)}"
 
 
 class Preregistration(Model):
@@ -108,15 +92,6 @@ class Preregistration(Model):
         return f"{self.words}\nSHA-256 of this preregistration: `{self.sha256}`\n"
 
 
-def plain_value(value: JsonValue) -> str:
-    """A value as people read it.
-
-    >>> plain_value(None), plain_value("random"), plain_value([1, True])
-    ('none', '"random"', '[1, true]')
-    """
-    return "none" if value is None else json.dumps(value, ensure_ascii=False)
-
-
 # what a study is now
 
 
@@ -140,16 +115,7 @@ def as_frozen(path: Path) -> FileValues:
 
     What is frozen is published, and its hash lets nothing be taken out of it later.
     """
-    return _without_reasons(read_toml(path))
-
-
-def _without_reasons(values: FileValues) -> FileValues:
-    listed = values.get("excluded")
-    return {**values, "excluded": [_without_reason(one) for one in listed]} if isinstance(listed, list) else values
-
-
-def _without_reason(entry: JsonValue) -> JsonValue:
-    return {key: value for key, value in entry.items() if key != "reason"} if isinstance(entry, dict) else entry
+    return without_reasons(read_toml(path))
 
 
 def _files_of(file: str, setup: Setup[DesignConfig]) -> Files:
@@ -178,26 +144,6 @@ def changes(frozen: Files, now: Files) -> tuple[KeyChange, ...]:
         for file in dict.fromkeys([*frozen, *now])
         for change in changed_keys(file, frozen.get(file, {}), now.get(file, {}))
     )
-
-
-def changed_keys(file: str, frozen: FileValues, now: FileValues) -> Iterator[KeyChange]:
-    """The keys of one file that differ."""
-    before, after = (dict(_leaves(_without_reasons(values))) for values in (frozen, now))
-    for key in dict.fromkeys([*before, *after]):
-        if before.get(key) != after.get(key) or isinstance(before.get(key), bool) != isinstance(after.get(key), bool):
-            yield KeyChange(file=file, key=key, frozen=before.get(key), now=after.get(key))
-
-
-def _leaves(value: JsonValue | FileValues, key: str = "") -> Iterator[tuple[str, JsonValue]]:
-    """Dotted keys with what is no table; the tables of a list are numbered from 0, as everywhere."""
-    if isinstance(value, list) and any(isinstance(one, dict) for one in value):
-        value = {str(number): one for number, one in enumerate(value)}
-    if not isinstance(value, Mapping):
-        yield key, value
-        return
-    for name, inner in value.items():
-        part = name if _BARE.fullmatch(name) else json.dumps(name, ensure_ascii=False)
-        yield from _leaves(inner, f"{key}.{part}" if key else part)
 
 
 def changes_of_run(frozen: Preregistration, setup: object) -> tuple[KeyChange, ...]:

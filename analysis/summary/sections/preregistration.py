@@ -9,7 +9,7 @@ from analysis.report.section import Section, Table
 from analysis.summary.deviations import Deviation, FrozenAs, StudyDeviations
 from analysis.summary.sections.content import ReportData
 from device.messages import how_many
-from experiments.study.preregistration import plain_value
+from experiments.study.changes import plain_value
 
 
 def deviations_sections(report: ReportData) -> Iterator[Section]:
