@@ -22,6 +22,7 @@ from experiments.record.replay import last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
 from experiments.study import folders, register
+from experiments.study.changes import changes_told, people_changes, setup_changes
 from experiments.study.folders import Place, PlaceError
 from experiments.written_tables import answers_in
 
@@ -159,27 +160,31 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
 
 def resumed_plan(before: Contents, request: RunRequest, gun: Gun) -> Plan:
     """The plan of the run to go on with. `PlaceError` if files, seed or kind of gun are not those it began with."""
-    began, now = before.head.setup_sha256, request.setup.sha256()
-    given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
-    if began != now:
-        raise NotAsItBegan(
-            before.path,
-            f"the run began with another config or gun file (setup {began[:12]}, now {now[:12]}); "
-            f"resume with the files it began with, which {given_back} gives back",
-        )
+    _check_same_files(before, request)
     plan = before.plan
-    people = request.setup.laws.model_dump(mode="json") if request.setup.laws is not None else None
-    if request.simulated and before.head.laws_json not in (None, people):
-        raise NotAsItBegan(
-            before.path,
-            f"the run began with other synthetic people than {request.setup.config.synthetic} has now; "
-            f"resume with those it began with, whom {given_back} gives back",
-        )
     _check_same_language(before, request)
     _check_same_kind_of_gun(before, gun)
     if request.seed is not None and request.seed != plan.seed:
         raise PlaceError(f"{before.path}: the run began with seed {plan.seed}, not {request.seed}; leave out --seed")
     return plan
+
+
+def _check_same_files(before: Contents, request: RunRequest) -> None:
+    """`PlaceError` names the keys of config, gun or synthetic people that are not as the run began with them."""
+    setup, head = request.setup, before.head
+    given_back = f"`recoil configs --from {shlex.quote(str(before.path))} --copy DIR`"
+    if changes := setup_changes(head.setup_json, setup.record(), (setup.source.name, setup.config.gun)):
+        raise NotAsItBegan(
+            before.path,
+            f"the run began with another config or gun file: {changes_told(changes)}; "
+            f"resume with the files it began with, which {given_back} gives back",
+        )
+    if request.simulated and (changes := people_changes(head.laws_json, setup)):
+        raise NotAsItBegan(
+            before.path,
+            f"the run began with other synthetic people than there are now: {changes_told(changes)}; "
+            f"resume with those it began with, whom {given_back} gives back",
+        )
 
 
 def _check_same_kind_of_gun(before: Contents, gun: Gun) -> None:

@@ -226,7 +226,7 @@ def test_another_config_or_gun_is_refused(
     journal = broken_off(unbroken[name], tmp_path, records)
     before = journal.read_bytes()
     for setup in others(name):
-        with pytest.raises(PlaceError, match=r"began with another config or gun file .*--fresh"):
+        with pytest.raises(PlaceError, match=r"config or gun file: \S+: title \(.*, now \"another\"\); .*--fresh"):
             run(request(name, tmp_path, "resume", setup=setup), synthetic_screen, VirtualClock())
     assert journal.read_bytes() == before
 

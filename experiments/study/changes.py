@@ -1,19 +1,32 @@
-"""What differs between configs as they were recorded and as they are: the keys of their files, with both values."""
+"""What differs between configs as they were recorded and as they are: the keys of their files, with both values.
+
+A record of a design, a gun or a study has all their keys, with their defaults. A key that it lacks was unknown to the
+version of Recoil that wrote it: it stands for its default, which means what that version did. A key that this version
+does not know is a change. So hashes can say that two records are the same, and not that something was changed.
+"""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
-from pydantic import JsonValue
+from pydantic import JsonValue, ValidationError
 
+from device.messages import first_few
 from experiments.config.door import Model
+from experiments.config.setup import GunConfig, Setup
+from experiments.design.config import DesignConfig
+from experiments.synthetic.laws import SyntheticAnswers
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
+_TOLD = 5
+"""So many keys are told."""
 FileValues = Mapping[str, JsonValue]
 Files = Mapping[str, FileValues]
 """The files of a study, by their place beside `study.toml`, as plain values."""
+_OF_SETUP: dict[str, type[Model]] = {"experiment": DesignConfig, "gun": GunConfig}
+"""The parts of a setup, as the head of a journal names them."""
 
 
 class KeyChange(Model):
@@ -37,12 +50,57 @@ def plain_value(value: JsonValue) -> str:
     return "none" if value is None else json.dumps(value, ensure_ascii=False)
 
 
-def changed_keys(file: str, frozen: FileValues, now: FileValues) -> Iterator[KeyChange]:
-    """The keys of one file that differ."""
+def changed_keys(
+    file: str, frozen: FileValues, now: FileValues, model: type[Model] | None = None
+) -> Iterator[KeyChange]:
+    """The keys of one file that differ. `model`: what it is read as, if its defaults are recorded."""
     before, after = (dict(_leaves(without_reasons(values))) for values in (frozen, now))
+    if model is not None and before.keys() != after.keys():
+        before, after = _with_defaults(model, frozen), _with_defaults(model, now)
     for key in dict.fromkeys([*before, *after]):
         if before.get(key) != after.get(key) or isinstance(before.get(key), bool) != isinstance(after.get(key), bool):
             yield KeyChange(file=file, key=key, frozen=before.get(key), now=after.get(key))
+
+
+def _with_defaults(model: type[Model], recorded: FileValues) -> dict[str, JsonValue]:
+    """What was recorded by dotted keys, and for what it lacks this version's defaults.
+
+    It stands as it is where this version refuses a value of it.
+    """
+    try:
+        read = model.model_validate_json(json.dumps(recorded), extra="ignore")
+    except ValidationError:
+        return dict(_leaves(recorded))
+    return {**dict(_leaves(read.model_dump(mode="json"))), **dict(_leaves(recorded))}
+
+
+def setup_changes(before: object, after: object, files: tuple[str, str] = ("experiment", "gun")) -> list[KeyChange]:
+    """The keys that differ between two setups as journals hold them; `files`: what their parts are called."""
+    return [
+        change
+        for file, (part, model) in zip(files, _OF_SETUP.items(), strict=True)
+        for change in changed_keys(file, table_in(before, part), table_in(after, part), model)
+    ]
+
+
+def people_changes(began: object, setup: Setup[DesignConfig]) -> list[KeyChange]:
+    """The keys that differ of how synthetic people answer: as a journal's head holds it, if it does, and in a setup."""
+    if not isinstance(began, Mapping):
+        return []
+    now = {} if setup.laws is None else setup.laws.model_dump(mode="json")
+    return [*changed_keys(str(setup.config.synthetic), began, now, SyntheticAnswers)]
+
+
+def changes_told(changes: Sequence[KeyChange]) -> str:
+    """What is not as a run began with it, in words."""
+    told = [f"{one.file}: {one.key} ({plain_value(one.frozen)}, now {plain_value(one.now)})" for one in changes]
+    return first_few(told, _TOLD)
+
+
+def table_in(found: object, key: str) -> FileValues:
+    """A table of what was recorded; empty if there is none."""
+    inner = found.get(key) if isinstance(found, Mapping) else None
+    return inner if isinstance(inner, Mapping) else {}
 
 
 def _leaves(value: JsonValue | FileValues, key: str = "") -> Iterator[tuple[str, JsonValue]]:

@@ -20,6 +20,7 @@ from experiments.load import load_setup
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
 from experiments.record.tables import guard
+from experiments.study.changes import changes_told, people_changes, setup_changes
 from experiments.study.folders import PlaceError
 from experiments.synthetic.laws import SyntheticAnswers, TableLaw
 
@@ -135,20 +136,13 @@ def _write(files: Mapping[Path, bytes], check: Callable[[], None]) -> None:
 
 def _check(head: Head, config: Path) -> None:
     """`ConfigError` unless the copies load to the setup that the journal names, and to its synthetic people."""
-    path, sha256 = head.path, head.setup_sha256
     try:
         setup = load_setup(str(config))
     except ConfigError as error:
-        raise ConfigError(f"{path}: line 1: what the run began with does not load here:\n{error}") from error
-    found = setup.sha256()
-    people = setup.laws.model_dump(mode="json") if setup.laws is not None else None
-    if found == sha256 and people != head.laws_json:
+        raise ConfigError(f"{head.path}: line 1: what the run began with does not load here:\n{error}") from error
+    changes = [*setup_changes(head.setup_json, setup.record()), *people_changes(head.laws_json, setup)]
+    if changes:
         raise ConfigError(
-            f"{path}: line 1: this version of Recoil reads the run's synthetic people otherwise than that which wrote "
-            "them; go on with the version that the head names (provenance)"
-        )
-    if found != sha256:
-        raise ConfigError(
-            f"{path}: line 1: the run began with setup {sha256[:12]}, but this version of Recoil makes {found[:12]} "
-            "of the same values; go on with the version that the head names (provenance)"
+            f"{head.path}: line 1: this version of Recoil reads what the run began with otherwise than that which "
+            f"wrote it: {changes_told(changes)}; go on with the version that the head names (provenance)"
         )

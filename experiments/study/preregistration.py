@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -20,11 +20,19 @@ from pydantic import JsonValue, ValidationError
 from device.messages import RecoilError
 from experiments.clock import date_text
 from experiments.config.door import ConfigError, Model, StudyConfig, read_toml
-from experiments.config.setup import Setup, sha256
+from experiments.config.setup import GunConfig, Setup, sha256
 from experiments.design.config import DesignConfig
 from experiments.record import storage
 from experiments.record.lines import strict_json
-from experiments.study.changes import Files, FileValues, KeyChange, changed_keys, without_reasons
+from experiments.study.changes import (
+    Files,
+    FileValues,
+    KeyChange,
+    changed_keys,
+    setup_changes,
+    table_in,
+    without_reasons,
+)
 
 STUDY_FILE = "study.toml"
 JOURNALS = "results/sub-*/sub-*_journal.jsonl"
@@ -75,7 +83,7 @@ class Preregistration(Model):
     @property
     def study(self) -> StudyConfig:
         """The study as it was frozen."""
-        return StudyConfig.model_validate_json(json.dumps(self.files[STUDY_FILE]))
+        return StudyConfig.model_validate_json(json.dumps(self.files[STUDY_FILE]), extra="ignore")
 
     @property
     def designs(self) -> dict[str, str]:
@@ -119,8 +127,8 @@ def as_frozen(path: Path) -> FileValues:
 
 
 def _files_of(file: str, setup: Setup[DesignConfig]) -> Files:
-    places = (file, _beside(file, setup.config.gun))
-    return dict(zip(places, map(_values, setup.record().values()), strict=True))
+    record, gun = setup.record(), _beside(file, setup.config.gun)
+    return {file: table_in(record, "experiment"), gun: table_in(record, "gun")}
 
 
 def _place(file: str | Path) -> str:
@@ -133,32 +141,30 @@ def _beside(file: str, named: str) -> str:
     return _place(Path(file).parent / named)
 
 
-def _values(found: object) -> FileValues:
-    return found if isinstance(found, dict) else {}
-
-
 def changes(frozen: Files, now: Files) -> tuple[KeyChange, ...]:
     """Every key that differs, in the order of the files; a default that is spelled out is the same."""
+    names = now[STUDY_FILE].get("experiments")
+    designs = [_place(str(name)) for name in names] if isinstance(names, list) else []
+    guns = [_beside(file, str(now[file].get("gun"))) for file in designs]
+    models: dict[str, type[Model]] = {STUDY_FILE: StudyConfig}
+    models |= {**dict.fromkeys(guns, GunConfig), **dict.fromkeys(designs, DesignConfig)}
     return tuple(
         change
         for file in dict.fromkeys([*frozen, *now])
-        for change in changed_keys(file, frozen.get(file, {}), now.get(file, {}))
+        for change in changed_keys(file, frozen.get(file, {}), now.get(file, {}), models.get(file))
     )
 
 
 def changes_of_run(frozen: Preregistration, setup: object) -> tuple[KeyChange, ...]:
     """What a run's setup has otherwise than it was frozen; `setup` is the record of it, as in the journal's head."""
-    found = setup if isinstance(setup, Mapping) else {}
-    design, gun = _values(found.get("experiment")), _values(found.get("gun"))
-    file = design_file(frozen, str(design.get("design")))
+    design = table_in(setup, "experiment").get("design")
+    file = design_file(frozen, str(design))
     if file is None:
         names = frozen.files[STUDY_FILE].get("experiments")
-        return (KeyChange(file=STUDY_FILE, key="experiments", frozen=names, now=design.get("design")),)
+        return (KeyChange(file=STUDY_FILE, key="experiments", frozen=names, now=design),)
     of_gun = gun_file(frozen, file)
-    return (
-        *changed_keys(file, frozen.files[file], design),
-        *changed_keys(of_gun, frozen.files.get(of_gun, {}), gun),
-    )
+    own = {"experiment": frozen.files[file], "gun": frozen.files.get(of_gun, {})}
+    return tuple(setup_changes(own, setup, (file, of_gun)))
 
 
 def design_file(frozen: Preregistration, design: str) -> str | None:
@@ -255,7 +261,7 @@ def _read(path: Path, number: int) -> Preregistration:
         stated = found.pop("sha256", None)
         one = Preregistration.model_validate_json(json.dumps(found))
         if STUDY_FILE in one.files:
-            StudyConfig.model_validate_json(json.dumps(one.files[STUDY_FILE]))
+            StudyConfig.model_validate_json(json.dumps(one.files[STUDY_FILE]), extra="ignore")
     except FileNotFoundError as error:
         raise PreregistrationError(f"{path}: is missing, though its page or a later one is not; {_RESTORE}") from error
     except OSError as error:
