@@ -14,7 +14,10 @@ from typing import Any, NamedTuple
 import pytest
 from pydantic import BaseModel
 
+from analysis.archive.archive_export import ArchiveRequest, export_archive
 from analysis.archive.preregistration import freeze
+from analysis.logs.reading import read_logs
+from analysis.summary.deviations import AnalysisFiles, deviations
 from device.simulated import SimulatedGun
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.door import Model, StudyConfig, checked_table, read_toml
@@ -27,7 +30,7 @@ from experiments.record.journal import read_journal
 from experiments.run import run
 from experiments.run_request import Again, RunRequest
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.changes import KeyChange, setup_changes
+from experiments.study.changes import KeyChange, setup_changes, setup_key
 from experiments.study.files_begun_with import copy_began_with
 from experiments.study.folders import freeze_status
 from experiments.study.new_study import new_study
@@ -161,6 +164,7 @@ def test_a_key_that_was_not_recorded_is_no_change_at_its_default_and_named_other
         then = now | {part: without(now[part], key.place)}
         for found in (setup_changes(then, now), setup_changes(now, then)):
             assert (not found) if key.is_default else key.names(found), (now["experiment"]["design"], key, found)
+        assert (setup_key(then) == setup_key(now)) is key.is_default
 
 
 @pytest.mark.slow
@@ -242,11 +246,18 @@ def frozen_text(study: Path) -> str:
 
 
 @pytest.mark.slow
-def test_a_run_that_an_earlier_version_began_goes_on(study: Path, tmp_path: Path) -> None:
+def test_a_run_that_an_earlier_version_began_goes_on_and_counts_with_later_ones(study: Path, tmp_path: Path) -> None:
     journal = write_as_recorded(study, of_no_default)
     assert len(copy_began_with(journal, tmp_path / "back")) == 3
     assert do(study, "P01", "resume") == journal
     assert read_journal(journal).finished
+    do(study, "P02")
+    logs = read_logs([study / "results"])
+    assert [one.message for one in logs.remarks if "setups" in one.message] == []
+    ((told,), _) = deviations(logs, AnalysisFiles())
+    assert {one.kind for one in told.deviations} == {"participants"}
+    export_archive(ArchiveRequest(folder=study, out=tmp_path / "archive"))
+    assert "Experiment `preference`, 2 participants" in (tmp_path / "archive" / "METHODS.md").read_text()
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ from analysis.report.terminal import Progress, unseen
 from analysis.summary.analyze import analyze
 from analysis.summary.requests import Requests
 from experiments.config.door import checked_table, load, read_text
-from experiments.config.setup import GunConfig, sha256
+from experiments.config.setup import GunConfig
 from experiments.rebuild import began_with, rebuild, shots_path, shots_table
 from experiments.record import design_columns, journal
 from experiments.record.dictionary import design_dictionary, shots_dictionary
@@ -43,7 +43,7 @@ from experiments.record.journal import Contents, JournalError
 from experiments.record.provenance import recoil_version
 from experiments.record.shots_table import SHOTS
 from experiments.record.tables import DataKind
-from experiments.study.changes import Files
+from experiments.study.changes import Files, setup_key
 from experiments.study.folders import PlaceError
 from experiments.study.register import REGISTER_FILE
 from experiments.study.study import Member
@@ -244,8 +244,8 @@ def _designs(runs: Iterable[_Run]) -> list[ArchivedDesign]:
     for run in sorted(runs, key=lambda run: (run.contents.plan.experiment, run.code)):
         of_head = redaction.without_places(run.contents.head.setup_json)
         setup = of_head if isinstance(of_head, dict) else {}
-        by_setup.setdefault(sha256(setup), []).append(run)
-        setups[sha256(setup)] = setup
+        by_setup.setdefault(setup_key(setup), []).append(run)
+        setups.setdefault(setup_key(setup), setup)
         first.setdefault(run.contents.plan.experiment, setup)
     return [_design(some, setups[key], first[some[0].contents.plan.experiment]) for key, some in by_setup.items()]
 

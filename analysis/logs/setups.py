@@ -13,7 +13,7 @@ from device.messages import first_few, how_many
 from experiments.record import journal
 from experiments.record.journal import JournalError
 from experiments.record.tables import DataKind
-from experiments.study.changes import Files, changed_keys, plain_value
+from experiments.study.changes import Files, plain_value, setup_changes, setup_key
 
 _NAMED = 20
 """So many people, and so many keys, are named."""
@@ -42,7 +42,19 @@ def changed_setups(logs: Iterable[SetupOfLog]) -> list[Problem]:
     for log in logs:
         if log.setup:
             groups.setdefault((log.study, log.experiment, log.kind), {}).setdefault(log.setup, []).append(log)
-    return [_told(setups) for setups in groups.values() if len(setups) > 1]
+    differing = [_differing(setups) for setups in groups.values() if len(setups) > 1]
+    return [_told(setups) for setups in differing if len(setups) > 1]
+
+
+def _differing(setups: Mapping[str, list[SetupOfLog]]) -> dict[str, list[SetupOfLog]]:
+    """The logs by setup, those of one that two versions of Recoil recorded together."""
+    found: dict[str, list[SetupOfLog]] = {}
+    for setup, logs in setups.items():
+        key = setup
+        with suppress(JournalError):
+            key = setup_key(_setup(logs[0]))
+        found.setdefault(key, []).extend(logs)
+    return found
 
 
 def _told(setups: Mapping[str, list[SetupOfLog]]) -> Problem:
@@ -76,9 +88,8 @@ def _differences(first: SetupOfLog, other: SetupOfLog, most: int) -> str:
 def setup_differences(before: Files, after: Files, most: int = _NAMED) -> str:
     """The keys that differ between two setups, each with both values; so many at most."""
     changes = [
-        f"{file} {change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
-        for file in ("experiment", "gun")
-        for change in changed_keys(file, before.get(file, {}), after.get(file, {}))
+        f"{change.file} {change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
+        for change in setup_changes(before, after)
     ]
     return first_few(changes, most)
 

@@ -15,7 +15,7 @@ from pydantic import JsonValue, ValidationError
 
 from device.messages import first_few
 from experiments.config.door import Model
-from experiments.config.setup import GunConfig, Setup
+from experiments.config.setup import GunConfig, Setup, sha256
 from experiments.design.config import DesignConfig
 from experiments.synthetic.laws import SyntheticAnswers
 
@@ -95,6 +95,12 @@ def changes_told(changes: Sequence[KeyChange]) -> str:
     """What is not as a run began with it, in words."""
     told = [f"{one.file}: {one.key} ({plain_value(one.frozen)}, now {plain_value(one.now)})" for one in changes]
     return first_few(told, _TOLD)
+
+
+def setup_key(setup: object) -> str:
+    """What setups share between which nothing differs, by whichever version they were recorded."""
+    parts = [_with_defaults(model, table_in(setup, part)) for part, model in _OF_SETUP.items()]
+    return sha256([{key: value for key, value in part.items() if value is not None} for part in parts])
 
 
 def table_in(found: object, key: str) -> FileValues:
