@@ -261,12 +261,16 @@ def words_shown(request: RunRequest) -> tuple[dict[str, str], dict[str, str]] | 
 
 
 def _check_same_language(before: Contents, request: RunRequest) -> None:
-    """`PlaceError` if the run began in another language, or in other words of it: it was shown so up to here."""
+    """`PlaceError` if the run began in another language, or in other words of it: it was shown so up to here.
+
+    A message that the version of Recoil did not have that began it was not shown, and one that is gone is not any more.
+    """
     began, now = before.head.language, request.language
     code = ENGLISH.code if began is None else began.code
     if code != now.code:
         raise PlaceError(f"{before.path}: the run began in {code}, not in {now.code}; resume with --language {code}")
-    if words_shown(request) != (None if began is None else (began.messages, began.texts)):
+    shown = () if began is None else zip((began.messages, began.texts), words_shown(request) or ({}, {}), strict=True)
+    if any(was[name] != now[name] for was, now in shown for name in was.keys() & now.keys()):
         raise NotAsItBegan(
             before.path,
             f"the run began with another catalogue {code} than there is now; resume with the one it began with",

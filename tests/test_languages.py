@@ -56,6 +56,7 @@ from experiments.session.steps import Rate
 from experiments.study.folders import PlaceError
 from experiments.study.new_study import designs
 from recoil.session import LanguageOptions, run_session
+from tests.journals import forged, raw
 from tests.pseudo_languages import HEADS, LONG, RIGHT_TO_LEFT, SAID, compiled, write_catalogue, write_pseudo_languages
 
 ROOM = Path(catalogue.__file__).parents[1]
@@ -552,6 +553,16 @@ def test_what_is_told_after_an_answer_is_in_the_language(tmp_path, folder):
 def cut(place, lines=30):
     """The journal as if the run had broken off."""
     place.journal.write_bytes(b"".join(place.journal.read_bytes().splitlines(keepends=True)[:lines]))
+
+
+def test_a_run_goes_on_where_recoil_has_a_message_that_it_did_not_have_when_the_run_began(tmp_path, folder):
+    place = carried_out(tmp_path, language(LONG, folder))
+    cut(place)
+    head, *rest = raw(place.journal)
+    del head["language"]["messages"]["wait"]
+    head["language"]["messages"]["farewell"] = "one that it had then"
+    place.journal.write_bytes(forged([head, *rest]))
+    assert read_journal(carried_out(tmp_path, language(LONG, folder), again="resume").journal).finished
 
 
 def test_a_run_goes_on_in_the_words_that_it_began_in(tmp_path, folder):
