@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import pytest
 
+from analysis.paper.audit.tukey_pattern import ClaimedComparison, tukey_pattern
 from tests import brute_force as brute
 
 pytestmark = pytest.mark.slow
@@ -56,6 +57,16 @@ def test_p_says_what_mpmath_says() -> None:
 
 def test_tukey_never_accuses_data_that_exist() -> None:
     assert brute.tukey_accusations(2, 1)[0] == 2
+
+
+def test_tukeys_p_values_that_print_so_for_other_means_than_the_printed_ones_are_found() -> None:
+    """The p-values are scipy's of the means 5.12, 6.33 and 7.81 of 12 values each and an error term of 2.9."""
+    claimed = ((1, 0, "= .206"), (2, 0, "= .001"), (2, 1, "= .099"))
+    comparisons = [ClaimedComparison(higher=higher, lower=lower, p=p) for higher, lower, p in claimed]
+    wrong = [*comparisons[:2], ClaimedComparison(higher=2, lower=1, p="= .300")]
+    for given, verdict in ((comparisons, "attainable"), (wrong, "not attainable")):
+        found = tukey_pattern("7.51", [12] * 3, given, ["5.1", "6.3", "7.8"], repeated=False)
+        assert found.judged.verdict == verdict
 
 
 def test_df_say_what_their_definitions_say() -> None:

@@ -10,10 +10,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from math import isqrt
 
 import numpy as np
+from scipy.optimize import NonlinearConstraint, minimize
 
 from analysis.paper.audit.lattices import column_choices
 from analysis.paper.audit.means import AnswerScale, check_count, scale_of
@@ -31,6 +32,7 @@ from analysis.paper.audit.printed import (
     judge_readings,
     read_printed,
 )
+from analysis.stats.arrays import FloatArray
 from analysis.stats.studentized_range import studentized_range_isf
 from experiments.config.door import Model
 
@@ -40,6 +42,7 @@ _POINTS, _GOLDEN = 12, Fraction(618, 1000)
 """Means tried within what prints alike, and the step that spreads them evenly."""
 _SPANS, _BOXES = {2: 13, 3: 13, 4: 7}, 200
 """Small whole means that are tried by their number, and sets of means on the lattice."""
+_TINY = 1e-100
 Box = tuple[Interval, ...]
 """The values that each mean may have."""
 Point = tuple[Fraction, ...]
@@ -142,7 +145,8 @@ def _means(pattern: _Pattern, adjust: Adjust, rounding: Rounding) -> DataExisten
     if boxes is not None and not any(_box_possible(pattern, box, F, adjust, rounding) for box in boxes):
         return NONE_EXISTS
     around = _inside(F, pattern.F.value)
-    for point in _points(pattern, boxes):
+    tried = [] if boxes is None or adjust is not _tukey else _fitted(pattern, boxes[0], F, rounding)
+    for point in chain(tried, _points(pattern, boxes)):
         if not all(point[c.higher] > point[c.lower] for c in pattern.comparisons):
             continue
         solved = boxes is not None and adjust is _tukey
@@ -158,15 +162,49 @@ def _solved(pattern: _Pattern, point: Point, F: Interval, rounding: Rounding) ->
     box = tuple(Interval(mean, mean) for mean in point)
     for c in pattern.comparisons:
         share = float(_shares(pattern, box, c, _apart(box[c.higher], box[c.lower]))[0])
-        claims = _claims(c, rounding)
-        least = max(claim.low or Fraction(0) for claim in claims)
         if share == 0:
             return []
-        ends = [min(max(float(end), 1e-12), 1.0) for end in (claims[0].high or Fraction(1), least)]
-        squares = np.square(studentized_range_isf(ends, pattern.k, pattern.df)) / share
+        squares = np.square(_claimed_q(pattern, c, rounding)) / share
         low, high = max(low, float(squares[0])), min(high, float(squares[1]))
     middle = Fraction((low + high) / 2)
     return [middle] if low < high and F.holds(middle) else []
+
+
+def _claimed_q(pattern: _Pattern, c: ClaimedComparison, rounding: Rounding) -> FloatArray:
+    """The least and the greatest q of what is claimed, about."""
+    claims = _claims(c, rounding)
+    least = max(claim.low or Fraction(0) for claim in claims)
+    ends = [min(max(float(end), 1e-12), 1.0) for end in (claims[0].high or Fraction(1), least)]
+    return np.asarray(studentized_range_isf(ends, pattern.k, pattern.df))
+
+
+def _fitted(pattern: _Pattern, box: Box, F: Interval, rounding: Rounding) -> list[Point]:
+    """Means of a box as far as can be from the ends of all that is printed, F and p too: a guess, to be checked."""
+    ends = [[float(one.low or 0), float(one.high or 0)] for one in (*box, F)]
+    ends += [[*_claimed_q(pattern, c, rounding)] for c in pattern.comparisons]
+    middle, half = np.mean(ends, axis=1), np.diff(ends, axis=1)[:, 0] / 2
+    if not (pattern.comparisons and all(half > 0)):
+        return []
+    high, low = np.array([(c.higher, c.lower) for c in pattern.comparisons]).T
+    sizes = np.array(pattern.sizes, dtype=np.float64)
+
+    def room(x: FloatArray) -> FloatArray:
+        """How far each number is from the ends, in halves of what is between them, less that of all."""
+        own = middle[: pattern.k + 1] + half[: pattern.k + 1] * x[:-1]
+        means, apart = own[:-1], own[high] - own[low]
+        effect = np.sum(sizes * (means - np.average(means, weights=sizes)) ** 2) / (pattern.k - 1)
+        error = max(effect, _TINY) * (1 / sizes[high] + 1 / sizes[low])  # times F
+        found = apart * np.sqrt(2 * max(own[-1], 0.0) / error)
+        z = np.append(x[:-1], (found - middle[pattern.k + 1 :]) / half[pattern.k + 1 :])
+        return np.append(1 - x[-1] - z, 1 - x[-1] + z)
+
+    def less_room(x: FloatArray) -> float:
+        return -float(x[-1])
+
+    within = NonlinearConstraint(room, 0.0, np.inf)
+    fitted = minimize(less_room, np.zeros(pattern.k + 2), method="SLSQP", constraints=within).x
+    point = tuple(map(Fraction, middle[: pattern.k] + half[: pattern.k] * fitted[: pattern.k]))
+    return [point] if all(one.holds(mean) for one, mean in zip(box, point, strict=True)) else []
 
 
 def _inside(F: Interval, value: Fraction) -> list[Fraction]:
