@@ -344,11 +344,13 @@ def test_a_design_that_keeps_people_too_long_is_shown_and_never_proposed(tmp_pat
 @pytest.mark.slow
 def test_what_is_reached_only_by_keeping_people_too_long_is_told_so(tmp_path: Path) -> None:
     """An ANOVA of 40 trials a method, whose interval starts above the target; of 10 it does not."""
-    request = PowerRequest(config="direction", participants="10", trials="10,40", effects="0.5", studies=50)
+    request = PowerRequest(config="direction", participants="10", trials="10,40", effects="0.5,1", studies=50)
     with on_processes(1):
         found = feature.power(request, tmp_path, _silent, workers=1)
-    (line,) = (item for item in in_short(found).items if ", ANOVA, " in item)
-    assert line.endswith("effect × 0.5: none: what reaches it keeps a participant too long (at most 96.0 %)")
+    (line,) = (item for item in in_short(found).items if " for ANOVA: " in item)
+    too_long = "effect × 0.5: none: what reaches it keeps a participant too long (at most 96.0 %)"
+    assert line.endswith(f" for ANOVA: {too_long}; effect × 1: 10 people × 10 trials a method, 3.3 h")
+    assert "| Asymmetric Force II above Vibration, p < 0.001 |" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -52,11 +52,12 @@ def _false_positive_lines(found: Power) -> Iterator[str]:
 
 def _power_lines(found: Power) -> Iterator[str]:
     yield from filter(None, [_pattern_sentence(found.published_pattern)])
-    for row in found.smallest:
-        if row.claim in HEADLINES:
-            methods = f", {_listed(row.methods)}" if _varies(found, "methods") else ""
-            setting = f"{claim_name(row.claim)}, {_effect(row.effect)}{methods}"
-            yield f"The smallest design that reaches {apa.percent(found.target, 0)}, {setting}: {_reached(found, row)}"
+    headlines = [row for row in found.smallest if row.claim in HEADLINES]
+    for rows in _grouped(headlines, lambda row: (row.claim, row.methods)):
+        methods = f" of {_listed(rows[0].methods)}" if _varies(found, "methods") else ""
+        reached = "; ".join(f"{_effect(row.effect)}: {_reached(found, row)}" for row in rows)
+        target = apa.percent(found.target, 0)
+        yield f"The smallest design that reaches {target} for {claim_name(rows[0].claim)}{methods}: {reached}"
     if too_long := sum(bool(design.too_long) for design in found.designs):
         yield f"{too_long} of {len(found.designs)} designs keep a participant too long; none of them is proposed."
 
@@ -180,7 +181,7 @@ def _too_long(found: Power) -> Iterator[str]:
 
 
 def _pattern(studies: int, pattern: PublishedPattern) -> Section:
-    rows = tuple((one.claim.removeprefix(f"{PUBLISHED}, "), share_cell(one)) for one in pattern.claims)
+    rows = tuple((claim_name(one.claim).removeprefix(f"{PUBLISHED}, "), share_cell(one)) for one in pattern.claims)
     caption = f"{studies} studies of {pattern.participants} people, {pattern.trials} trials a method"
     return Section(
         title="Would the published pattern recur?",
