@@ -68,6 +68,7 @@ def test_each_procedure_and_number_of_trials_has_its_figures(found: ThresholdPow
 
 @pytest.mark.slow
 def test_a_plan_says_which_procedure_to_take_and_what_was_assumed(found: ThresholdPower, tmp_path: Path) -> None:
+    assert plan_in_short(found).title.endswith(": threshold of response, voltage in V, 6 simulated people a procedure")
     assert plan_in_short(found).items[0].startswith(f"10 trials (3 min): take {found.best['10']} (interval ")
     parts = sections_of_plan(found, tmp_path)
     (table,) = parts[1].tables

@@ -62,7 +62,8 @@ def sections_of_plan(found: ThresholdPower, figures: Path) -> tuple[Section, ...
 
 def plan_in_short(found: ThresholdPower) -> Section:
     """Which procedure to take, by number of trials."""
-    title = f"{found.title}: threshold of {found.question}, {found.people} simulated people a procedure"
+    of = f"{found.question}, {factor_words(found.factor)}"
+    title = f"{found.title}: threshold of {of}, {found.people} simulated people a procedure"
     return Section(title=title, items=tuple(_lines(found)))
 
 
