@@ -389,13 +389,13 @@ def _onsets(table: _Table) -> Iterator[_LogRule]:
     """
     found, none = onset_moments(table.texts.column("onset_utc"))
     rows = np.flatnonzero(found >= 0)
-    flags = [(text or "").split() for text in table.texts.column("flags").to_pylist()]
-    again = np.array([REPEATED in some for some in flags], dtype=bool)[rows]
+    codes, flags = few(table.texts.column("flags").dictionary_encode())
+    again = np.array([REPEATED in some.split() for some in flags], dtype=bool)[codes[rows]]
     last = np.maximum.accumulate(np.where(again, -1, np.arange(rows.size)))
     before = np.concatenate([[-1], last[:-1]])[: rows.size]
     log = table.logs(rows)
     earlier = rows[(before >= 0) & (found[rows] < found[rows[before]]) & (log == log[before])]
-    unsaid = [row for row in earlier.tolist() if CLOCK_SET_BACK not in flags[row]]
+    unsaid = [row for row in earlier.tolist() if CLOCK_SET_BACK not in flags[codes[row]].split()]
 
     def say(rule: Callable[[str], str], row: int) -> BadLogError:
         return table.fault(rule(table.texts.column("onset_utc")[row].as_py()), row, "onset_utc")
