@@ -937,6 +937,27 @@ def test_a_pause_ends_a_train_and_its_trial_is_presented_again_with_both_exposur
     assert float(rows[0]["exposure_s"]) > LEAST_S
 
 
+def test_of_trains_at_which_the_gun_failed_or_the_run_ended_it_is_known_how_long_they_were_felt(tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        for _ in range(2):
+            sitting.clock.skip(1.0)
+            sitting.settle()
+        sitting.gun.fails = [LinkError("no answer")]
+        sitting.clock.skip(1.0)
+        sitting.settle()
+        sitting.to(S.TRAIN)
+        sitting.clock.skip(1.0)
+        sitting.settle()
+        assert sitting.live.offer(events.EmergencyStop())
+    with sat(PREFERENCE, tmp_path, resumed=True) as sitting:
+        contents, rows = to_the_end(sitting)
+    ended = [word for _, word in history(contents) if isinstance(word, Failed | Interrupted)]
+    assert [(word.presented, word.shots) for word in ended] == [(True, 3), (True, 2)]
+    assert [word.exposure_s for word in ended] == pytest.approx([2.0, 1.0])
+    assert (rows[0]["attempts"], rows[0]["flags"]) == ("3", "device-error interrupted")
+    assert float(rows[0]["earlier_exposure_s"]) == pytest.approx(3.0)
+
+
 def test_a_disarming_that_is_slow_does_not_disarm_the_next_shot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -121,12 +121,11 @@ def _answered(name: str, question: QuestionConfig, entered: list[Answered | Entr
 
 def exposure_row(events: TrialHistory) -> Row:
     """The last exposure to a train, and how long earlier ones of the same trial were felt before it."""
-    felt = [word.exposure_s for word in events.words if isinstance(word, Presented | Interrupted) and word.exposure_s]
     shown = events.last(Presented)
-    if shown is None:
-        return {"earlier_exposure_s": round(sum(felt), 6)} if felt else {}
-    row: Row = {"shots": shown.shots, "exposure_s": shown.exposure_s}
-    return row | ({"earlier_exposure_s": round(sum(felt[:-1]), 6)} if felt[:-1] else {})
+    others = [word for word in events.words if isinstance(word, Presented | Failed | Interrupted) and word is not shown]
+    felt = [word.exposure_s for word in others if word.exposure_s is not None]
+    row: Row = {} if shown is None else {"shots": shown.shots, "exposure_s": shown.exposure_s}
+    return row | ({"earlier_exposure_s": round(sum(felt), 6)} if felt else {})
 
 
 def _presentation(events: TrialHistory) -> Row:

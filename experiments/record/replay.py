@@ -57,12 +57,16 @@ _REMARKS = ("remark", "measured")
 def _read(contents: Contents, found: GrowingHistory) -> Iterator[steps.Step]:
     """The steps of a journal's records, each when it is there; what lies before it is in `found` by then."""
     step: steps.Step | None = None
+    shots: list[object] = []
     planned = frozenset(contents.plan.trials)
     for line in contents.records:
         if line.kind == "step":
             step = read_as(steps.STEP, line.body, _place(contents, line))
             _check_trial(contents, line, steps.trial_of(step), planned)
+            shots = []
             yield step
+        elif line.kind == "shot":
+            shots.append(line.body)
         elif line.kind in _REMARKS:
             remark = _remark(contents, line)
             _check_trial(contents, line, getattr(remark, "trial", None), planned)
@@ -72,11 +76,20 @@ def _read(contents: Contents, found: GrowingHistory) -> Iterator[steps.Step]:
         elif line.kind == "outcome":
             if step is None:
                 raise JournalError(f"{_place(contents, line)}: an outcome without its step; a line was lost")
-            outcome = read_as(steps.OUTCOME, line.body, _place(contents, line))
-            if isinstance(outcome, steps.Answered):
-                _check_value(contents, line, step, outcome.value)
-            found.append((step, outcome))
+            found.append((step, _outcome(contents, line, step, shots)))
             step = None
+
+
+def _outcome(contents: Contents, line: Record, step: steps.Step, train: list[object]) -> steps.Outcome:
+    """The outcome of a step; a train at which the gun failed, or the run, was felt as far as its last shot."""
+    outcome = read_as(steps.OUTCOME, line.body, _place(contents, line))
+    if isinstance(outcome, steps.Answered):
+        _check_value(contents, line, step, outcome.value)
+    if not train or not isinstance(outcome, steps.Failed | steps.Interrupted) or outcome.exposure_s is not None:
+        return outcome
+    shots = read_as(steps.TRAIN_SHOTS, train, f"{_place(contents, line)}: the shots before it")
+    exposure_s = round(shots[-1].pulse_start_s - shots[0].pulse_start_s, 6)
+    return replace(outcome, shots=len(shots), exposure_s=exposure_s)
 
 
 def _check_trial(contents: Contents, line: Record, trial: Trial | None, planned: Collection[Trial]) -> None:

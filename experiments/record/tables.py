@@ -146,8 +146,8 @@ EXPOSURE = (
     seconds_column("exposure_s", "from the first pulse until the participant said next, at the last presentation"),
     seconds_column(
         "earlier_exposure_s",
-        "how long the same trial was felt before, at presentations that a pause ended or that were repeated; empty if "
-        "it was not",
+        "how long the same trial was felt before, at presentations that a pause ended, that were repeated, or at which "
+        "the gun failed or the run, as far as the last shot; empty if it was not",
     ),
 )
 """How long a train of shots was felt."""

@@ -255,11 +255,14 @@ class Closed:
 class Failed:
     """The gun did not do it, or may not have: the trial is presented again.
 
-    `presented` tells whether its stimulus may have been felt: a shot that was refused was not.
+    `presented` tells whether its stimulus may have been felt: a shot that was refused was not. Of a train it is known
+    from its shots how long that was.
     """
 
     cause: str
     presented: bool = True
+    shots: int | None = None
+    exposure_s: float | None = None
     kind: Literal["failed"] = "failed"
 
 
@@ -358,6 +361,8 @@ OUTCOME: TypeAdapter[Outcome] = TypeAdapter(
     Annotated[Outcome, Field(discriminator="kind")], config=ConfigDict(defer_build=True)
 )
 """Reads the outcome that a record holds."""
+TRAIN_SHOTS: TypeAdapter[list[TrainShot]] = TypeAdapter(list[TrainShot], config=ConfigDict(defer_build=True))
+"""Reads the shots of a train that records hold."""
 
 
 def step_record(word: Step | Outcome | TrainShot) -> dict[str, object]:
