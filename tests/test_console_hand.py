@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from experiments.session.states import State
-from tests.at_display import AtConsole, needs_display, remarks, virtual_display
+from tests.at_display import HAND_S, AtConsole, needs_display, remarks, virtual_display
 from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_in_one_run, check_participants_keys
 from tests.journals import raw
 from tests.pseudo_languages import RIGHT_TO_LEFT, write_pseudo_languages
@@ -167,6 +167,24 @@ def test_a_shot_that_was_asked_for_while_the_console_stood_still_is_not_fired(tm
         screen.keys.press("space")
         screen.at("asking")
     assert [one["event"] for one in remarks(cell.journal, "refused")] == ["fire"]
+
+
+def test_each_press_while_the_console_stood_still_is_on_record_and_a_key_that_was_held_is_one(
+    tmp_path: Path, display: str
+) -> None:
+    cell = Cell(tmp_path, display, S.PREPARING)
+    with cell.reach() as screen:
+        with screen.standing_still(2.5):
+            for key in ("space", "space", "m", "space"):
+                screen.keys.press(key)
+                time.sleep(HAND_S)
+            screen.keys.key_down("space")
+            time.sleep(HELD_S)
+            screen.keys.key_up("space")
+        screen.heard()
+        assert cell.watch.calls("fired") == []
+    refused = [one["event"] for one in remarks(cell.journal, "refused")]
+    assert refused == ["fire", "fire", "damper", "fire", "fire"]
 
 
 def test_a_test_shot_whose_key_was_let_go_while_the_console_stood_still_is_not_fired(

@@ -350,7 +350,10 @@ class Hold:
 
 
 class Presses:
-    """Which keys are down, so that a press acts once."""
+    """Which keys are down, so that a press acts once.
+
+    Times are the window system's stamps: what was pressed while the program stood still is seen all at once.
+    """
 
     def __init__(self) -> None:
         self._down: set[str] = set()
@@ -359,7 +362,7 @@ class Presses:
 
     def down(self, key: str, at_s: float, *, repeated: bool) -> bool:
         """Whether this press acts: the key was up, and a hand let it go."""
-        fresh = key not in self._down and at_s - self._up_s.get(key, -math.inf) >= BOUNCE_S
+        fresh = key not in self._down and not 0 <= at_s - self._up_s.get(key, -math.inf) < BOUNCE_S
         if not repeated:
             self._down.add(key)
         return fresh and not repeated
@@ -383,10 +386,6 @@ class Presses:
         """Whether a key is down."""
         return key in self._down
 
-    def set_back(self, by_s: float) -> None:
-        """All that was told so far happened so much earlier."""
-        self._up_s = {key: up_s - by_s for key, up_s in self._up_s.items()}
-
     def lost(self) -> set[str]:
         """The window has lost the keys: what was down, which may be let go unseen."""
         were, self._down = self._down, set()
@@ -396,20 +395,14 @@ class Presses:
 class EventClock:
     """When events happened, on the run's clock, from the stamps of the window system, whose zero is its own.
 
-    The stamp can be no later than the event is seen: the smallest difference ever seen is that of the clocks. Where an
-    event shows that those before it were seen late, `earlier` is told by how much: else a key that was pressed while
-    the window was still being drawn, and again a moment later, seems to bounce.
+    The stamp can be no later than the event is seen: the smallest difference ever seen is that of the clocks.
     """
 
-    def __init__(self, earlier: Callable[[float], None]) -> None:
-        self._offset_s, self._earlier = math.inf, earlier
+    def __init__(self) -> None:
+        self._offset_s = math.inf
 
-    def at(self, stamp_ms: int, now_s: float) -> float:
+    def at(self, stamp_s: float, now_s: float) -> float:
         """When an event with a stamp happened that is seen now."""
-        stamp_s = stamp_ms / 1000
-        if (offset_s := now_s - stamp_s) < self._offset_s:
-            if self._offset_s < math.inf:
-                self._earlier(self._offset_s - offset_s)
-            self._offset_s = offset_s
+        self._offset_s = min(self._offset_s, now_s - stamp_s)
         at_s = stamp_s + self._offset_s
         return at_s if now_s - at_s < STRANGE_S else now_s

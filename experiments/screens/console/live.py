@@ -15,7 +15,6 @@ from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtGui import QGuiApplication
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
-from device.machine_clock import machine_s
 from device.messages import RecoilError
 from experiments.catalogues.catalogue import Language
 from experiments.clock import RealClock
@@ -273,7 +272,7 @@ def ask_about(request: RunRequest, found: UnfinishedRun) -> RunRequest | None:
     `KeyboardInterrupt` if a signal ended the question.
     """
     dialog = Unfinished(request, found)
-    FreshShortcuts(dialog, machine_s)
+    FreshShortcuts(dialog)
     with signals_to(lambda _: dialog.reject()) as signalled:
         dialog.exec()
     decided = dialog.decided

@@ -373,7 +373,7 @@ def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest
     window.closed.connect(loop.quit)
     with windows.signals_to(window.leave_for):
         windows.open_as_left(window, _NAME)
-        windows.FreshShortcuts(window, clock.now)
+        windows.FreshShortcuts(window)
         window.activateWindow()
         loop.exec()
     choice = window.choice

@@ -241,7 +241,7 @@ class Keyboard(QtCore.QObject):
         super().__init__()
         self._hears, self._now = hears, now
         self._presses = Presses()
-        self._clock = EventClock(self._presses.set_back)
+        self._clock = EventClock()
         self._into: dict[str, QWidget | None] = {}
         """Where a key went as text when it went down."""
 
@@ -253,23 +253,29 @@ class Keyboard(QtCore.QObject):
                 self._hears.up(key)
         if not isinstance(event, QKeyEvent):
             return False
-        key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
+        key = key_name(event)
         if event.type() == QtCore.QEvent.Type.KeyRelease:
-            number = self._presses.up(key, at_s, repeated=event.isAutoRepeat())
+            number = self._presses.up(key, self._stamp_s(event), repeated=event.isAutoRepeat())
             if not event.isAutoRepeat():
                 QtCore.QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
             return False
         if event.type() != QtCore.QEvent.Type.KeyPress:
             return False
-        return self._pressed(key, event, at_s)
+        return self._pressed(key, event)
+
+    def _stamp_s(self, event: QKeyEvent) -> float:
+        """When the window system saw an event; one that an input method makes may have no stamp."""
+        return event.timestamp() / 1000 or self._now()
 
     def _let_go(self, key: str, number: int) -> None:
         """Say that a key was let go by a release, if it was."""
         if self._presses.was_let_go(key, number):
             self._hears.up(key)
 
-    def _pressed(self, key: str, event: QKeyEvent, at_s: float) -> bool:
-        acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
+    def _pressed(self, key: str, event: QKeyEvent) -> bool:
+        stamp_s = self._stamp_s(event)
+        at_s = self._clock.at(stamp_s, self._now())
+        acts = self._presses.down(key, stamp_s, repeated=event.isAutoRepeat())
         name = self._hears.command(key, ctrl=bool(event.modifiers() & QtCore.Qt.KeyboardModifier.ControlModifier))
         if name is None:
             return self._hears.is_elsewhere(key) or self._is_stale_text(key, fresh=acts)
@@ -292,10 +298,9 @@ class FreshShortcuts(QtCore.QObject):
     Qt itself takes a repeated key for a new one when the machine is too busy to read its two events together.
     """
 
-    def __init__(self, widget: QWidget, now: Callable[[], float]) -> None:
+    def __init__(self, widget: QWidget) -> None:
         super().__init__(widget)
-        self._now, self._presses = now, Presses()
-        self._clock = EventClock(self._presses.set_back)
+        self._presses = Presses()
         self._stale = ""
         widget.winId()  # it has no window (`QWindow`) before
         if (window := widget.windowHandle()) is not None:
@@ -308,13 +313,13 @@ class FreshShortcuts(QtCore.QObject):
             self._presses.lost()
         if not isinstance(event, QKeyEvent):
             return False
-        key, at_s = key_name(event), self._clock.at(event.timestamp(), self._now())
+        key, stamp_s = key_name(event), event.timestamp() / 1000
         if event.type() == QtCore.QEvent.Type.KeyRelease:
             if self._presses.is_down(key):
-                self._presses.up(key, at_s, repeated=event.isAutoRepeat())
+                self._presses.up(key, stamp_s, repeated=event.isAutoRepeat())
             return False
         if event.type() == QtCore.QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
-            acts = self._presses.down(key, at_s, repeated=event.isAutoRepeat())
+            acts = self._presses.down(key, stamp_s, repeated=event.isAutoRepeat())
             self._stale = "" if acts else key
             event.setAccepted(not acts)
         elif event.type() == QtCore.QEvent.Type.ShortcutOverride:
