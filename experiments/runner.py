@@ -20,7 +20,7 @@ from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.record.replay import RunPosition
 from experiments.session import events, steps
 from experiments.session.history import trial_at
-from experiments.session.remarks import TestShot
+from experiments.session.remarks import Refused, TestShot
 from experiments.session.states import State
 from experiments.tasks.questions import on_scale
 
@@ -427,6 +427,9 @@ class DeskGun:
             raise
         if isinstance(meanwhile, events.Pause | events.ParticipantLost):
             return steps.Interrupted(presented=felt, cause="pause")
+        if isinstance(meanwhile, events.Next):  # it was taken, and ends nothing any more
+            said = events.word(events.Next)
+            self._live.remark(Refused(event=said, state=State.TRAIN, because=str(error), by="experimenter"))
         lost = events.GunFault if isinstance(error, LimitError) else events.LinkLost
         self._live.offer(lost(cause=str(error)))
         return steps.Failed(cause=str(error), presented=felt)

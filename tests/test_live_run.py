@@ -1007,7 +1007,7 @@ def test_a_stop_while_the_gun_cannot_be_armed_is_no_attempt(end: Event, tmp_path
     assert rows[0]["attempts"] == "1"
 
 
-def test_next_said_while_a_shot_fails_leaves_a_fault_of_the_gun_and_no_pause(tmp_path: Path) -> None:
+def test_next_said_while_a_shot_fails_leaves_a_fault_of_the_gun_and_no_pause_and_is_on_record(tmp_path: Path) -> None:
     with sat_at(S.TRAIN, tmp_path) as sitting:
         sitting.gun.hang = "fire"
         sitting.gun.fails = [LinkError("no answer")]
@@ -1017,8 +1017,9 @@ def test_next_said_while_a_shot_fails_leaves_a_fault_of_the_gun_and_no_pause(tmp
         assert sitting.live.offer(events.Next())
         sitting.gun.release()
         sitting.settle()
-        _, rows = to_the_end(sitting)
+        contents, rows = to_the_end(sitting)
     assert (rows[0]["attempts"], rows[0]["flags"]) == ("2", "device-error")
+    assert remarks(contents, Refused) == [Refused(event="next", state=S.TRAIN, because="no answer", by="experimenter")]
 
 
 @pytest.mark.parametrize(("error", "attempts"), [(LinkError("no answer"), "2"), (LimitError("too soon"), "1")])
