@@ -81,7 +81,7 @@ class ParticipantSeen(Message):
 class Trouble(Message):
     """Something went wrong, and what; or, by its mood, what is done about it.
 
-    Of a `trial` it stands also below what is saved, until another trial is answered.
+    Of a `trial` it stands also below what is saved, until something is said of another trial.
     """
 
     text: str

@@ -29,7 +29,7 @@ from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Failed, Prepared, Rested, trial_of
+from experiments.session.steps import Failed, Prepared, Rested, trial_of
 from experiments.session.tracks import Tracks, adaptive_tracks
 
 REFRESH_MS = 100
@@ -140,8 +140,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
                 if message.failure:
                     self._forget_good()
             case view.Trouble():
-                self._beside = message if message.trial is not None else self._beside
-                self._last(message.text, message.mood)
+                self._trouble(message)
             case view.Ended():
                 self._end(message)
         self._show_soon()
@@ -182,6 +181,13 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
 
+    def _trouble(self, message: view.Trouble) -> None:
+        """Say what went wrong until something else is to be said; that it is well again for a few seconds."""
+        self._beside = message if message.trial is not None else self._beside
+        self._last("" if message.mood == "good" else message.text, message.mood)
+        if message.mood == "good":
+            self.say(message.text, message.mood)
+
     def _forget_good(self) -> None:
         """What went well before is not to stand below an emergency stop, or below what is lost."""
         if self._lasting[1] == "good":
@@ -194,7 +200,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if isinstance(message.word, Rested):
             self.say(text, "good")
         elif text:
-            if self._beside and isinstance(message.word, Answered) and trial_of(message.step) != self._beside.trial:
+            if self._beside and trial_of(message.step) not in (None, self._beside.trial):
                 self._beside = None
             text = f"{text}\n{self._beside.text}" if self._beside else text
             self._failure = text if isinstance(message.word, Failed) else ""
