@@ -267,7 +267,7 @@ def test_what_the_gun_said_before_an_emergency_stop_says_nothing_of_what_it_is_a
 
 def test_a_gun_that_has_not_answered_for_a_while_is_not_shown_in_its_last_state() -> None:
     asked = seen(DIRECTION, Position(), gun=GunSeen(status=status_of("disarmed"), asked_s=1.0))
-    assert progress.gun_text(replace(asked, now_s=1.0 + progress.UNANSWERED_S))[1] == "good"
+    assert progress.gun_text(replace(asked, now_s=1.0 + view.UNANSWERED_S))[1] == "good"
     text, mood = progress.gun_text(replace(asked, now_s=5.0))
     assert (text, mood) == ("Gun: no answer for 4 s", "wait")
 
@@ -338,6 +338,24 @@ def test_after_an_emergency_stop_nothing_comes_next_and_no_end_is_told() -> None
     trial = plan_of(DIRECTION).trials[0]
     assert progress.coming(seen(DIRECTION, Position(states=(State.ASKING,), step=ask(trial))))
     assert not progress.coming(seen(DIRECTION, Position(states=(State.HALTED,), step=ask(trial))))
+
+
+def test_before_a_test_shot_nothing_that_is_done_is_still_to_come() -> None:
+    plan = plan_of(PREFERENCE)
+    told: list[Any] = [(present(trial), SHOWN) for trial in plan.trials]
+    rearming = Position(states=(State.REARMING,))
+    assert progress.coming(seen(PREFERENCE, rearming, *told)) == ["ratings and words", "the end"]
+    told += [(one(trial), RATED) for trial in plan.trials for one in (rate, describe)]
+    assert progress.coming(seen(PREFERENCE, rearming, *told)) == ["the end"]
+
+
+def test_a_train_is_not_said_to_go_on_while_the_gun_does_not_answer() -> None:
+    train = Position(states=(State.TRAIN,), step=present(plan_of(PREFERENCE).trials[0]))
+    here = seen(PREFERENCE, train, gun=GunSeen(status=status_of("armed"), asked_s=9.5), now_s=10.0)
+    assert "The gun goes on firing until then. Press Space" in instruction(here).detail
+    silent = GunSeen(status=None, asked_s=9.5, fault="no answer")
+    for gone in (replace(here, gun=silent), replace(here, now_s=10.6)):
+        assert "The gun does not answer. Press Space" in instruction(gone).detail
 
 
 def test_the_participants_screen_has_the_keys_from_one_rating_or_description_to_the_next_and_no_longer() -> None:

@@ -210,4 +210,6 @@ def test_a_closed_gun_is_disarmed_and_its_port_free(pair):
     assert (pair.gun.status().state, pair.gun.status().shots) == ("disarmed", 1)
     assert not pair.twin.core.strict
     again = open_gun(f"serial:{pair.socket.address}", clock=time.monotonic)
+    assert again.status().shots == 1
     again.close()
+    assert again.status().shots == 1

@@ -31,7 +31,7 @@ from experiments.run import run
 from experiments.run_request import ParticipantOptions, RunRequest
 from experiments.screens.console import live, widgets
 from experiments.screens.console.app import application
-from experiments.screens.console.form import Opening
+from experiments.screens.console.form import Opening, PeopleTable
 from experiments.screens.console.live import study_of
 from experiments.screens.console.start import NOTHING_ARMED, StartWindow
 from experiments.screens.synthetic import synthetic_screen
@@ -39,7 +39,7 @@ from experiments.study import enrolment, register
 from experiments.study.folders import StudyFolder, open_study, place
 from experiments.study.new_study import new_study
 from experiments.study.register import read_register
-from experiments.study.study import Facts
+from experiments.study.study import Facts, Participant, RunProgress
 
 pytestmark = pytest.mark.slow
 
@@ -876,3 +876,23 @@ def test_the_table_shows_practice_and_no_numbers_of_its_own(study: StudyFolder, 
     window = opened()
     assert table(window)["P01"][0] == "–\npractice done"
     assert not window.table.verticalHeader().isVisible()
+
+
+def test_why_somebody_is_excluded_is_not_cut_where_several_experiments_stand_before_it() -> None:
+    out = Participant(
+        participant_id="P01",
+        runs=tuple(
+            RunProgress(experiment=name, state="in progress", answered=3, planned=42, practised=True)
+            for name in ("direction", "preference", "another")
+        ),
+        facts=None,
+        excluded="felt unwell",
+    )
+    for width in (941, 560):
+        table = PeopleTable([run.experiment for run in out.runs])
+        table.resize(width, 300)
+        table.show_people([out])
+        table.show()
+        QTest.qWait(0)
+        assert table.columnWidth(4) >= table.sizeHintForColumn(4)
+        table.close()

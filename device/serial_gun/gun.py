@@ -47,6 +47,7 @@ class SerialGun:
         self.history = DriveHistory()
         self._mark = time.time_ns() // 1_000_000 % 2**31 + 1
         self._counted: tuple[int, int] | None = None  # the gun's boot, and its count of shots; None if it is not known
+        self._last_said = 0  # the count that the gun said last
         self._first: tuple[int, float] | None = None  # onset of the first shot since `arm`, on the gun's clock and ours
         self._set = (0, "")  # the session and the setting that the gun has
         self._closed = False
@@ -119,9 +120,9 @@ class SerialGun:
     def status(self) -> GunStatus:
         """The gun at this moment. After `close` what is known without it. `LinkError`: it does not answer."""
         if self._closed:
-            counted = 0 if self._counted is None else self._counted[1]
-            return self._status("disarmed", counted, 0.0, self.history.ready_s, None)
+            return self._status("disarmed", self._last_said, 0.0, self.history.ready_s, None)
         reply, said = standing(self.link)
+        self._last_said = said.count
         (ready,) = self.link.host(said.ready_us)
         next_s = max(self.history.ready_s, ready_s(said, reply, ready))
         return self._status(_STATES[said.state], said.count, said.coil_mC / 1000, next_s, self._fault(said))
@@ -205,6 +206,7 @@ class SerialGun:
             self._spend(order.wanted, self.clock())
             raise
         self._counted = order.boot, told.record.count
+        self._last_said = told.record.count
         self._first = self._first or (told.record.start_us, told.start.time_s)
         self._spend(order.wanted, max(told.start.time_s + told.start.uncertainty_s, order.requested_s))
         return report(order, told)

@@ -8,7 +8,7 @@ from typing import get_args
 
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import Qt, pyqtSignal
-from PyQt6.QtGui import QGuiApplication, QScreen
+from PyQt6.QtGui import QGuiApplication, QResizeEvent, QScreen
 
 from experiments.catalogues.catalogue import ENGLISH, Language
 from experiments.config.door import Fact, Handedness, Sex
@@ -224,7 +224,6 @@ class PeopleTable(QtWidgets.QTableWidget):
         across, down = self.horizontalHeader(), self.verticalHeader()
         if across is not None and down is not None:
             across.setSectionResizeMode(QtWidgets.QHeaderView.ResizeMode.ResizeToContents)
-            across.setStretchLastSection(True)
             down.setVisible(False)  # numbers beside codes are no codes
             down.setSectionResizeMode(QtWidgets.QHeaderView.ResizeMode.ResizeToContents)
         self.itemSelectionChanged.connect(self._chosen)
@@ -239,6 +238,20 @@ class PeopleTable(QtWidgets.QTableWidget):
             for column, text in enumerate(cells):
                 self.setItem(line, column, QtWidgets.QTableWidgetItem(text))
         self.blockSignals(False)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
+        """The last column takes what room there is."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Stretch the last column where all of them have room; else it is scrolled to, and not cut."""
+        across, view = self.horizontalHeader(), self.viewport()
+        if across is not None and view is not None:
+            columns = range(self.columnCount())
+            wide = sum(max(self.sizeHintForColumn(one), across.sectionSizeHint(one)) for one in columns)
+            across.setStretchLastSection(wide <= view.width())
 
     def _chosen(self) -> None:
         code = self.item(self.currentRow(), 0)

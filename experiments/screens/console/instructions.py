@@ -126,13 +126,10 @@ def _preparing(seen: Seen) -> Instruction:
 def _train(seen: Seen) -> Instruction:
     least_s = seen.position.step.least_exposure_s if isinstance(seen.position.step, Present) else 0.0
     after = phrase(", not before {least_s:g}\N{NO-BREAK SPACE}s", least_s=least_s) if least_s else ""
-    return Instruction(
-        title=phrase("Wait for “next”"),
-        detail=phrase(
-            "The gun goes on firing until then. Press Space when the participant says it{after}.", after=after
-        ),
-        mood="ask",
-    )
+    silent = seen.gun_silent_s or seen.gun_trouble
+    fires = phrase("The gun does not answer.") if silent else phrase("The gun goes on firing until then.")
+    then = phrase("Press Space when the participant says it{after}.", after=after)
+    return Instruction(title=phrase("Wait for “next”"), detail=f"{fires} {then}", mood="ask")
 
 
 def _asking(seen: Seen) -> Instruction:

@@ -65,7 +65,9 @@ def coming(seen: Seen, count: int = 3) -> list[str]:
     step = seen.position.step
     if seen.ended is not None or seen.position.base is State.HALTED:
         return []
-    return [phrase("the end")] if isinstance(step, steps.Close) else [*islice(_to_come(seen), count)]
+    answers = answered(seen.told, seen.about.setup.config.questions)
+    is_over = isinstance(step, steps.Close) or answers.issuperset(seen.about.plan.trials)
+    return [phrase("the end")] if is_over else [*islice(_to_come(seen), count)]
 
 
 def _to_come(seen: Seen) -> Iterator[str]:
@@ -171,10 +173,6 @@ def _mark(told: History, word: Outcome | Remark) -> str:
             return ""
 
 
-UNANSWERED_S = 2.0
-"""What a gun said so long ago is not its state any more: it is asked five times a second."""
-
-
 def gun_text(seen: Seen) -> tuple[str, str]:
     """The gun's state in words, and a word that chooses the colour."""
     said = seen.gun
@@ -185,8 +183,8 @@ def gun_text(seen: Seen) -> tuple[str, str]:
         return phrase("Gun: FAULT – {fault}", fault=seen.gun_trouble), "bad"
     if seen.ended is not None and status.state != "disarmed":
         return phrase("Gun: not looked at any more"), "wait"
-    if seen.ended is None and seen.now_s - said.asked_s > UNANSWERED_S:
-        return phrase("Gun: no answer for {silent_s:.0f} s", silent_s=seen.now_s - said.asked_s), "wait"
+    if seen.gun_silent_s:
+        return phrase("Gun: no answer for {silent_s:.0f} s", silent_s=seen.gun_silent_s), "wait"
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
     return phrase(
         "Gun: {state}\n{shots} · coil {coil_temperature_C:.0f} °C",

@@ -25,6 +25,10 @@ THANK_PARTICIPANT = phrase("Thank the participant.")
 """The last sentence, where nothing else comes next."""
 
 
+UNANSWERED_S = 1.0
+"""What a gun said so long ago is not its state any more: it is asked five times a second."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Message:
     """Something that the run tells the window."""
@@ -149,6 +153,12 @@ class Seen:
     def gun_trouble(self) -> str:
         """Why the gun is not to be handed over, as it was seen last; empty if nothing is wrong."""
         return "" if self.gun is None else self.gun.trouble
+
+    @property
+    def gun_silent_s(self) -> float:
+        """For how long the gun has not answered; 0 if it has just now, or is not asked any more."""
+        silent_s = 0.0 if self.gun is None or self.ended is not None else self.now_s - self.gun.asked_s
+        return silent_s if silent_s > UNANSWERED_S else 0.0
 
     @property
     def participant_gone(self) -> bool:
