@@ -12,7 +12,10 @@ from experiments.load import load_setup
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
+from experiments.session.design_session import design_session
+from experiments.session.steps import Inform, Informed, Prepare
 from experiments.study.folders import PlaceError
+from tests.designs import changed
 
 DIRECTION, PREFERENCE = load_setup("direction"), load_setup("preference")
 
@@ -48,6 +51,14 @@ def test_a_practice_can_be_done_again_and_leaves_the_run_itself_open(tmp_path: P
     ]
     request = RunRequest(setup=DIRECTION, participant_id="P01", results=tmp_path, seed=1)
     assert run(request, synthetic_screen, VirtualClock()).place.table.name == "sub-P01_task-direction_trials.csv"
+
+
+def test_a_practice_asks_for_consent_before_anything_is_fired_and_tells_nothing_else_first() -> None:
+    texts = ({"kind": "instruction", "text": "Hold it."}, {"kind": "consent", "text": "I take part."})
+    setup = changed("direction", opening=texts)
+    steps = design_session(practice_of(setup.config, "P01", 1), setup)
+    assert next(steps) == Inform(text="I take part.", what="consent")
+    assert isinstance(steps.send(Informed()), Prepare)
 
 
 def test_an_experiment_without_a_practice_says_so(tmp_path: Path) -> None:

@@ -12,7 +12,10 @@ from experiments.design.language import MAX_TRIALS, ColumnName, DurationSeconds,
 
 
 class OpeningConfig(Model):
-    """A text for the participant before the first trial, which the experimenter confirms."""
+    """A text for the participant before the first trial, which the experimenter confirms.
+
+    One that asks for consent comes before the first trial of a practice as well.
+    """
 
     kind: Literal["instruction", "consent"] = "instruction"
     text: PageText

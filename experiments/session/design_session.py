@@ -38,15 +38,15 @@ def design_session(
     told: History = (),
     messages: ParticipantMessages = ENGLISH_MESSAGES,
 ) -> Session:
-    """The steps of a run of a design, from what is told first to its end. A practice is told nothing first.
+    """The steps of a run of a design, from what is told first to its end. Of that a practice begins with consent alone.
 
     `told` is what was done so far, and grows: levels that follow from the answers so far are chosen by it. `messages`
     are in the participant's language, as the texts of the setup's design are.
     """
     script = _Script(setup, plan, told, messages)
     presenter = Presenter(script.presentation)
-    if not plan.practice:
-        for opening in setup.config.opening:
+    for opening in setup.config.opening:
+        if opening.kind == "consent" or not plan.practice:  # nothing is fired at anybody before they have agreed
             yield from presenter.until_done(Inform(text=opening.text, what=opening.kind))
     before: Trial | None = None
     block: Trial | None = None
