@@ -1336,13 +1336,30 @@ def test_words_for_what_is_not_done_any_more_are_kept_as_a_note(tmp_path: Path) 
     with sat_at(S.ASKING, tmp_path) as sitting:
         sitting.press("R")
         sitting.window.fields["line"] = "she sneezed"
-        sitting.press("F12")
+        sitting.live.offer(events.EmergencyStop(by="participant"))
         sitting.paint()
         assert sitting.state is S.HALTED
         sitting.press("Enter")
         assert sitting.window.heard[-1].endswith("What you typed is kept as a note.")
         assert not sitting.controls.typing.line
         assert [remark.text for remark in remarks(of_journal(sitting), Noted)] == ["repeat: she sneezed"]
+
+
+def test_an_emergency_stop_takes_a_line_away_that_was_being_typed_and_keeps_it_as_a_note(tmp_path: Path) -> None:
+    with sat_at(S.RESTING, tmp_path) as sitting:
+        sitting.press("E")
+        sitting.window.type_text("bored")
+        sitting.press("F12")
+        assert not sitting.controls.typing.line
+        sitting.press("Y")
+        sitting.window.type_text("it smelt")
+        sitting.press("Enter")
+        sitting.press("Q")
+        sitting.finish()
+        contents = of_journal(sitting)
+    assert [note.text for note in remarks(contents, Noted)] == ["break: bored"]
+    assert [why.text for why in remarks(contents, HaltReason)] == ["it smelt"]
+    assert [line.reason for line in contents.records if line.kind == "stopped"] == ["emergency stop"]
 
 
 def test_what_is_no_flag_stays_to_be_typed_over(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ What a press means depends on what is on the screen: a page over it, a line that
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Literal, Protocol
 
 from experiments.clock import Clock
@@ -12,7 +13,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
 from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
-from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_as_note, line_event, line_question
+from experiments.screens.console.typed_lines import LINE_QUESTIONS, OF_THE_RUN, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import FLAG_RULE, entry_name, typed_line, typed_rating
 from experiments.session import events
@@ -183,6 +184,7 @@ class Controls:
         match name:
             case "emergency":
                 self._offer(events.EmergencyStop())
+                self._set_aside(OF_THE_RUN)
             case _ if self.page and name not in _PAGE_COMMANDS + _HOLDS:
                 self._run_again()
             case "help" | "list":
@@ -378,9 +380,9 @@ class Controls:
         elif self._line(name, trial, text, press):
             self._close_line()
 
-    def _set_aside(self) -> None:
-        """Another command takes the place of an open line: what is typed there is kept as a note."""
-        if self._open is None:
+    def _set_aside(self, names: Collection[keys.Name] = tuple(LINE_QUESTIONS)) -> None:
+        """Another command takes the place of an open line, for one of some: what is typed there is kept as a note."""
+        if self._open is None or self._open[0] not in names:
             return
         text = typed_line(self._view.typed("line"))
         if text:

@@ -21,6 +21,8 @@ LINE_QUESTIONS: dict[keys.Name, str] = {
     "reason": phrase("Why was there an emergency stop?"),
     "stop": phrase("Why does the run stop here? It can be resumed."),
 }
+OF_THE_RUN: tuple[keys.Name, ...] = ("end break", "repeat", "stop")
+"""Lines for what is not done any more after an emergency stop; a note, a flag and the reason still are."""
 
 
 def line_question(name: keys.Name, trial: Trial, live: LiveRun, *, kept: bool) -> str:
