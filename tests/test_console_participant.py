@@ -337,3 +337,19 @@ def test_where_there_is_no_x_the_synthetic_rating_is_refused_with_one_message(
     assert done.returncode == 2
     assert done.stderr.startswith("recoil: --visual --participant-screen rates by synthetic events, which only an X")
     assert done.stderr.count("\n") == 1
+
+
+def test_f12_on_the_participants_window_while_it_is_starting_halts_the_run(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.focus_on(PARTICIPANT)
+        assert not screen.watch.pages.exists()  # nothing was shown there yet
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
+        screen.focus_on(RUN)
+        screen.keys.press("q")
+        assert screen.close()[0] == 130
+    assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]
