@@ -28,6 +28,7 @@ from PyQt6.QtGui import QKeyEvent
 from PyQt6.QtWidgets import QApplication, QWidget
 
 from device.interrupts import INTERRUPTS
+from device.machine_clock import machine_s
 from experiments.screens.console.keys import EventClock, Name, Presses
 
 DESIGNED_FOR_PX = (1280, 800)
@@ -255,7 +256,7 @@ class Keyboard(QtCore.QObject):
             return False
         key = key_name(event)
         if event.type() == QtCore.QEvent.Type.KeyRelease:
-            number = self._presses.up(key, self._stamp_s(event), repeated=event.isAutoRepeat())
+            number = self._presses.up(key, _stamp_s(event), repeated=event.isAutoRepeat())
             if not event.isAutoRepeat():
                 QtCore.QTimer.singleShot(LET_GO_MS, lambda: self._let_go(key, number))
             return False
@@ -263,17 +264,13 @@ class Keyboard(QtCore.QObject):
             return False
         return self._pressed(key, event)
 
-    def _stamp_s(self, event: QKeyEvent) -> float:
-        """When the window system saw an event; one that an input method makes may have no stamp."""
-        return event.timestamp() / 1000 or self._now()
-
     def _let_go(self, key: str, number: int) -> None:
         """Say that a key was let go by a release, if it was."""
         if self._presses.was_let_go(key, number):
             self._hears.up(key)
 
     def _pressed(self, key: str, event: QKeyEvent) -> bool:
-        stamp_s = self._stamp_s(event)
+        stamp_s = _stamp_s(event)
         at_s = self._clock.at(stamp_s, self._now())
         acts = self._presses.down(key, stamp_s, repeated=event.isAutoRepeat())
         name = self._hears.command(key, ctrl=bool(event.modifiers() & QtCore.Qt.KeyboardModifier.ControlModifier))
@@ -313,7 +310,7 @@ class FreshShortcuts(QtCore.QObject):
             self._presses.lost()
         if not isinstance(event, QKeyEvent):
             return False
-        key, stamp_s = key_name(event), event.timestamp() / 1000
+        key, stamp_s = key_name(event), _stamp_s(event)
         if event.type() == QtCore.QEvent.Type.KeyRelease:
             if self._presses.is_down(key):
                 self._presses.up(key, stamp_s, repeated=event.isAutoRepeat())
@@ -338,6 +335,11 @@ def _may_be_shortcut(event: QKeyEvent) -> bool:
 
 
 _ASCII_END = 128
+
+
+def _stamp_s(event: QKeyEvent) -> float:
+    """When the window system saw an event, on its clock; one that an input method makes may have no stamp."""
+    return event.timestamp() / 1000 or machine_s()
 
 
 def key_name(event: QKeyEvent) -> str:
