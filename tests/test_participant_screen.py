@@ -3,12 +3,14 @@
 import os
 import signal
 import time
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.participant.messages import Look
+from experiments.screens.xkeys import Hands as XHands
 from tests.at_participant import (
     BUTTON_Y,
     FAR_S,
@@ -32,6 +34,9 @@ from tests.at_participant import (
     started,
 )
 from tests.waiting import PATIENCE_S, stand_still, wait_for
+
+REPEATED_S = 1.2
+"""After so long X has repeated a key that is held: it begins after 0.66 s if nobody sets that."""
 
 __all__ = ["ask", "console", "display", "hands", "link", "pytestmark"]
 
@@ -178,6 +183,66 @@ def test_the_marker_of_one_stimulus_never_stands_on_the_scale_of_another(ask, ha
     hands.click(LEFT_END, LINE_Y)
     hands.key("Return")
     assert other.result(PATIENCE_S).rating == 0.0
+
+
+@pytest.fixture
+def console_window(hands):
+    """Another program's window, which has the keys when it is given them and hears of none."""
+    from Xlib import X  # it comes with PsychoPy
+
+    root = hands.display.screen().root
+    window = root.create_window(0, 0, 9, 9, 0, root.get_geometry().depth)
+    window.map()
+    yield lambda: (window.set_input_focus(X.RevertToParent, X.CurrentTime), hands.display.sync())
+    window.destroy()
+    hands.display.sync()
+
+
+@contextmanager
+def held(hands, *names):
+    """Some keys are down meanwhile, for so long at first that the last one is repeated."""
+    with closing(XHands(hands.display.get_display_name())) as keys:
+        for name in names:
+            keys.key_down(name)
+        time.sleep(REPEATED_S)
+        yield
+        for name in reversed(names):
+            keys.key_up(name)
+
+
+def test_a_key_held_as_a_scale_takes_the_keys_does_nothing_on_it_until_it_goes_down_again(
+    ask, hands, link, console_window
+):
+    show(link, "Please wait")
+    console_window()
+    with held(hands, "Up"):
+        answer = ask(SCALE)
+        time.sleep(REPEATED_S)
+        hands.key("Return")
+        time.sleep(FAR_S)
+        assert not answer.done(), answer.result()
+    for name in ("Up", "Up", "Return"):
+        hands.key(name)
+    assert answer.result(PATIENCE_S).rating == 5.1
+
+
+def test_a_letter_held_as_a_description_takes_the_keys_is_not_written_in_it(ask, hands, link, console_window):
+    show(link, "Please wait")
+    console_window()
+    with held(hands, "t"):
+        answer = ask(WORDS)
+        time.sleep(REPEATED_S)
+    assert describe(hands, answer, "a", "t") == "at"
+
+
+def test_what_ends_a_description_is_held_and_does_not_end_the_next_one(ask, hands):
+    answer = ask(WORDS)
+    with held(hands, "Control_L", "Return"):
+        assert answer.result(PATIENCE_S).comment == ""
+        answer = ask(replace(WORDS, number=3, draft=1))
+        time.sleep(REPEATED_S)
+        assert not answer.done(), answer.result()
+    assert describe(hands, answer, "b") == "b"
 
 
 @pytest.fixture

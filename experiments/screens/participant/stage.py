@@ -1,8 +1,6 @@
 """The participant's window: what can be put on it, what happens on it, and the keys that it borrows.
 
-Places are in parts of the window's height from its middle, `half_width` to either side and 0.5 up and down. On X a
-program may say whose the keys are; elsewhere the system decides, and nothing is given back here. The console cannot
-take them back by itself: X and window managers refuse whoever was not worked at last.
+Places are in parts of the window's height from its middle, `half_width` to either side and 0.5 up and down.
 
 PsychoPy is imported here, all but its sound, and only when the program runs: it takes seconds and a display. Its
 keyboard stamps keys as they happen and not as frames are drawn, and hears them whichever window has the focus: a
@@ -17,64 +15,14 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from ctypes import byref, c_int, c_ulong
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from experiments.screens.participant import messages
+from experiments.screens.participant.focus import Focus
 from experiments.screens.participant.lettering import laid_out
-
-_NO_WINDOW = 1
-"""Up to this X means nobody, or whoever is under the pointer."""
-
-
-class Focus:
-    """The focus of a pyglet window."""
-
-    def __init__(self, window: Any) -> None:
-        self._window = window
-        self._lender = 0
-
-    def take(self) -> None:
-        """Take the keys, and keep in mind whose they were."""
-        holder = self._holder()
-        if holder not in (None, self._ours):
-            self._lender = holder or 0
-        self._window.activate()
-
-    def give_back(self) -> None:
-        """Let the lender have the keys again, if nobody has taken them since."""
-        if self._lender > _NO_WINDOW and self._holder() == self._ours:
-            xlib = _xlib()
-            xlib.XSetInputFocus(self._window._x_display, self._lender, xlib.RevertToParent, xlib.CurrentTime)
-            xlib.XFlush(self._window._x_display)
-        self._lender = 0
-
-    @property
-    def here(self) -> bool:
-        """Whether the window has the keys now; where there is no X, that is not known."""
-        return self._ours is not None and self._holder() == self._ours
-
-    @property
-    def _ours(self) -> int | None:
-        return getattr(self._window, "_window", None)
-
-    def _holder(self) -> int | None:
-        """The window that has the keys; `None` where there is no X."""
-        if not hasattr(self._window, "_x_display"):
-            return None
-        holder, reverts = c_ulong(), c_int()
-        _xlib().XGetInputFocus(self._window._x_display, byref(holder), byref(reverts))
-        return holder.value
-
-
-def _xlib() -> Any:
-    from pyglet.libs.x11 import xlib  # noqa: PLC0415 - where there is no X, it cannot be imported
-
-    return xlib
-
 
 _SMALLEST = 0.018
 _POINTS = 0.75
@@ -157,7 +105,7 @@ class Stage:
         self.width_px, self.height_px = (int(pixels) for pixels in self.window.clientSize)
         self.half_width = half_width(self.width_px, self.height_px)
         self.page = Page()
-        self._focus = Focus(self.window.winHandle)
+        self.focus = Focus(self.window.winHandle)
         self.drawn_s = 0.0
         """When the page was drawn last; 0 if it was not yet."""
         self._stood: object = None
@@ -170,7 +118,7 @@ class Stage:
             toolkit.add_font(look.font_file)  # boxes to type in look for theirs elsewhere
         self._handlers = _Handlers(self)  # pyglet holds them weakly
         self.window.winHandle.push_handlers(self._handlers)
-        if self._focus.here:  # that it came was told to nobody
+        if self.focus.here:  # that it came was told to nobody
             self._handlers.on_activate()
 
     def measure_refresh(self) -> float | None:
@@ -183,17 +131,19 @@ class Stage:
     def put(self, page: Page, *, keep_keys: bool = False) -> None:
         """Fill the window with another page; one that is typed on borrows the keys for as long as it stands.
 
-        What was done before it stands is done to the page that stood there: a second click is no rating.
+        What was done before it stands is done to the page that stood there: a second click is no rating, and a key
+        that is held still does nothing on this one.
         `keep_keys`: until the next one to type on the keys stay, so that no key goes to another window meanwhile.
         """
         self.window.winHandle.dispatch_events()
+        self._handlers.hear_new_keys()
         self.page.leave()
         self.page = page
         self.window.mouseVisible = page.pointer
         if page.typed:
-            self._focus.take()
+            self.focus.take()
         elif not keep_keys:
-            self._focus.give_back()
+            self.focus.give_back()
         self.drawn_s = 0.0
 
     def step(self) -> None:
@@ -267,7 +217,7 @@ class Stage:
 
     def close(self) -> None:
         """Close the window."""
-        self._focus.give_back()
+        self.focus.give_back()
         self.window.close()
 
 
@@ -292,8 +242,15 @@ class _Handlers:
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._names = stage.toolkit.key
+        self._new = False
+
+    def hear_new_keys(self) -> None:
+        """From now on a key counts that goes down; what one repeats that is held does not."""
+        self._new = False
 
     def on_activate(self) -> None:
+        self._stage.focus.find_held()
+        self.hear_new_keys()
         self._stage.unasked.append(messages.Focused(on=True))
 
     def on_deactivate(self) -> None:
@@ -315,14 +272,20 @@ class _Handlers:
             self._stage.page.released()
 
     def on_key_press(self, symbol: int, modifiers: int) -> bool:
+        self._new = True
         name = self._names.symbol_string(symbol)
         if name == EMERGENCY_KEY:
             self._stage.unasked.append(messages.EmergencyPressed())
             return True
         return self._stage.page.key(name, bool(modifiers & self._names.MOD_CTRL))
 
-    def on_text_motion(self, motion: int) -> None:
-        self._stage.page.motion(self._names.motion_string(motion))
+    def on_text(self, _: str) -> bool:
+        return not self._new
+
+    def on_text_motion(self, motion: int) -> bool:
+        if self._new:
+            self._stage.page.motion(self._names.motion_string(motion))
+        return not self._new
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
