@@ -210,7 +210,7 @@ def a_key_goes_into_a_note_and_a_page(screen: AtConsole, journal: Path, shown: i
         screen.until(why)
         before = len(remarks(journal, "refused"))
         screen.keys.press("Up")
-        screen.until(lambda look: look.says("The participant’s key was not taken."))
+        screen.until(lambda look: look.says("The participant’s answer was not taken."))
         wait_for(lambda before=before: len(remarks(journal, "refused")) > before)
         screen.keys.press("Escape")
         screen.until(lambda look: not look.line and not look.page)
@@ -241,6 +241,33 @@ def test_a_time_that_is_lost_is_said_until_the_next_trial_is_answered(
     first, second, *_ = rows(tmp_path, DIRECTION, "trials")
     assert "key-time-lost" in first["flags"]
     assert "key-time-lost" not in second["flags"]
+
+
+def test_a_key_that_loses_to_what_the_experimenter_entered_is_on_record_and_said_until_the_next_trial(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    differs = "“backward” was entered at the console and taken before “forward” came, though that went down"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=1)
+        screen.participant_shows("ChoicePage")
+        with screen.standing_still(0.2):
+            screen.keys.press("Up")
+            time.sleep(0.2)
+            screen.keys.press("b")
+        screen.until(lambda look: look.says(differs))
+        assert remarks(journal, "refused")[-1]["answer"] == "forward"
+        screen.to("asking", trial=2)
+        assert screen.look().says(differs)
+        screen.participant_shows("ChoicePage", 2)
+        screen.keys.press("Down")
+        screen.until(lambda look: look.says("Saved.") and not look.says(differs))
+        code, said = screen.stop()
+    assert code == 130, said
+    first, *_ = rows(tmp_path, DIRECTION, "trials")
+    assert (first["response"], first["response_source"]) == ("backward", "experimenter")
 
 
 def onsets_s(journal: Path) -> list[float]:

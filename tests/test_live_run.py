@@ -320,6 +320,8 @@ def test_a_key_for_an_earlier_question_is_refused(tmp_path: Path) -> None:
         late = own_key(sitting)
         sitting.press("F")
         sitting.to(S.ASKING)
+        sitting.press("F")
+        sitting.to(S.ASKING)
         assert sitting.live.offer(late).text == "It was the answer to an earlier question."
         assert sitting.live.offer(own_key(sitting))
 
@@ -559,6 +561,39 @@ def test_what_ends_the_run_before_the_description_keeps_the_rating_and_the_words
         assert own_words(sitting)
         _, rows = to_the_end(sitting)
     assert (rows[0]["rating"], rows[0]["rating_by"], rows[0]["comment"]) == ("3.0", "participant", "soft")
+
+
+def test_a_key_that_comes_behind_what_the_experimenter_entered_is_refused_with_its_answer(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        late = own_key(sitting)
+        sitting.press("F")
+        entered = sitting.position.entered_for(late.step)
+        assert isinstance(entered, events.Answer)
+        assert entered.at_s is not None
+        said = [sitting.live.offer(replace(late, at_s=entered.at_s + after_s)).text for after_s in (0.0, -2.0)]
+        same = sitting.live.offer(replace(late, response="forward")).text
+        sitting.to(S.PREPARING)
+        assert sitting.live.offer(replace(late, timed=False)).text == said[0]
+        contents = of_journal(sitting)
+    assert said == [
+        "“forward” was entered at the console and taken before “backward” came: undo (U) corrects it.",
+        "“forward” was entered at the console and taken before “backward” came, though that went down 2.00 s earlier: "
+        "undo (U) corrects it.",
+    ]
+    assert same == "“forward” was entered at the console first: it is the same."
+    kept = [word.answer for word in remarks(contents, Refused) if isinstance(word, Refused)]
+    assert kept == ["backward", "backward", "forward", "backward"]
+
+
+def test_a_rating_that_comes_behind_what_the_experimenter_entered_is_refused_with_its_answer(tmp_path: Path) -> None:
+    with sat(PREFERENCE, tmp_path) as sitting:
+        sitting.to(S.RATING)
+        late = events.ParticipantRated(rating=3.0, step=sitting.position.number)
+        sitting.type("7.5")
+        assert sitting.live.offer(late).text.startswith("“7.5” was entered at the console and taken before “3.0” came")
+        contents = of_journal(sitting)
+    assert [word.answer for word in remarks(contents, Refused) if isinstance(word, Refused)] == [3.0]
 
 
 def test_words_for_an_earlier_stimulus_are_refused(tmp_path: Path) -> None:

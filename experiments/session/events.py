@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from experiments.design.plan import Trial
+from experiments.tasks.questions import AnswerValue
 
 Hand = Literal["experimenter", "synthetic"]
 """Whose hand is at the console."""
@@ -298,6 +299,7 @@ _WORDS: dict[type[Event], str] = {
 KINDS: tuple[type[Event], ...] = tuple(_WORDS)
 """Every kind of event."""
 
+OwnHandEvent = ParticipantKey | ParticipantRated | ParticipantDescribed
 OWN_HAND_EVENTS = (ParticipantKey, ParticipantRated, ParticipantDescribed)
 """What the participant says by their own hand."""
 
@@ -320,11 +322,27 @@ ACTS: tuple[type[Event], ...] = (
 TO_FIRE = (Fire, GoOn)
 """What leads to a shot: pressed on a screen that stood still, it would come when nobody expects it any more."""
 
+ENTERED = (Answer, Rating, Description)
+"""What answers a question by the experimenter's hand."""
+
 TYPED: tuple[type[Event], ...] = (Flag, Note, Reason)
 """What is typed in a line that lay over what stands there: its Enter is not to act a second time."""
 
 DISARMS: tuple[type[Event], ...] = (Pause, Stop, EmergencyStop, ParticipantLost, DisplayLost, ResultsGone)
 """What has the gun disarmed at once, beside the run, where it may be armed; the emergency stop everywhere."""
+
+
+def answer_of(event: Event) -> AnswerValue:
+    """What an event says was answered; `None` if it says nothing, or that there is no answer."""
+    match event:
+        case Answer(response=said) | ParticipantKey(response=said):
+            return said
+        case Rating(rating=said) | ParticipantRated(rating=said) | Correct(value=said):
+            return said
+        case Description(text=said) | ParticipantDescribed(text=said):
+            return said
+        case _:
+            return None
 
 
 def word(kind: type[Event]) -> str:

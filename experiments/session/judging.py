@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
-from experiments.session.events import ACTS, OWN_HAND_EVENTS, TO_FIRE, Event, Press
+from experiments.session.events import ACTS, ENTERED, OWN_HAND_EVENTS, TO_FIRE, Event, Press
 from experiments.session.history import History, entered_value, entries, ranks_of_others, repeatable, trial_at
 from experiments.session.states import WHY_NOT, No, Position, State, after, why_after
 from experiments.session.steps import Ask, Asking, Inform, Rate, is_answer, what
@@ -97,7 +97,7 @@ def event_refusal(moment: Moment, event: Event, press: Press | None) -> str:
     judged = after(moment.position, type(event), moment.now_s)
     if isinstance(judged, No):
         halted_practice = moment.plan.practice and judged.because == WHY_NOT[State.HALTED]
-        return HALTED_PRACTICE if halted_practice else judged.because
+        return HALTED_PRACTICE if halted_practice else _entered_first(moment, event) or judged.because
     return _mistimed(moment, event, press) or _impossible(moment, event)
 
 
@@ -107,6 +107,8 @@ def moved(moment: Moment, event: Event) -> Position:
     position = after(before, type(event), moment.now_s)
     if isinstance(position, No):
         raise TypeError(position.because)
+    if isinstance(event, ENTERED):
+        position = replace(position, entered=(before.number, event))
     if isinstance(event, events.Undo):
         entry = moment.further_back
         serial = position.serial + (entry != before.correcting and position.serial == before.serial)
@@ -176,12 +178,10 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return ""
 
 
-def _not_asked(
-    moment: Moment, event: events.ParticipantKey | events.ParticipantRated | events.ParticipantDescribed
-) -> str:
+def _not_asked(moment: Moment, event: events.OwnHandEvent) -> str:
     """Why what the participant did is no answer to what is asked."""
     if event.step != moment.position.number:
-        return "It was the answer to an earlier question."
+        return _entered_first(moment, event) or "It was the answer to an earlier question."
     if isinstance(event, events.ParticipantRated):
         return _taken(moment, event.rating)
     if isinstance(event, events.ParticipantDescribed):
@@ -193,6 +193,21 @@ def _not_asked(
     if event.at_s >= moment.keys_from_s and not moment.paused_between(event.at_s, event.at_s):
         return ""
     return f"It went down before the {'stimulus' if moment.position.asked_at_onset else 'question'}, or in a pause."
+
+
+def _entered_first(moment: Moment, event: Event) -> str:
+    """Of what the participant did: that the experimenter entered an answer to that question, which was taken first."""
+    entered = moment.position.entered_for(event.step) if isinstance(event, OWN_HAND_EVENTS) else None
+    if entered is None:
+        return ""
+    said, own = events.answer_of(entered), events.answer_of(event)
+    if said == own:
+        return f"“{said}” was entered at the console first: it is the same."
+    earlier_s = 0.0
+    if isinstance(entered, events.Answer) and isinstance(event, events.ParticipantKey) and event.timed:
+        earlier_s = (entered.at_s or -math.inf) - event.at_s
+    though = f", though that went down {earlier_s:.2f} s earlier" if earlier_s > 0 else ""
+    return f"“{said}” was entered at the console and taken before “{own}” came{though}: undo (U) corrects it."
 
 
 def _taken(moment: Moment, rank: float | None) -> str:
@@ -263,6 +278,7 @@ def refused(event: Event, position: Position, because: str) -> remarks.Refused |
         state=str(position.state),
         because=because,
         by="participant" if own else "experimenter",
+        answer=events.answer_of(event),
     )
 
 

@@ -66,12 +66,13 @@ class Continued:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refused:
-    """Something was pressed that would have carried the run on, and was not taken; why."""
+    """Something was pressed that would have carried the run on, and was not taken; why, and what it would have said."""
 
     event: str
     state: str
     because: str
     by: Literal["experimenter", "participant"]
+    answer: AnswerValue = None
     kind: Literal["refused"] = "refused"
 
 

@@ -184,7 +184,8 @@ class Position:
     `onset_s` is when the last stimulus began; `not_before_s` is from when on the participant's next is taken at all;
     `keys_from_s` is from when on a participant's key may answer what is asked: the onset, if `asked_at_onset`, right
     after one stimulus, else when it was asked; `paused_s` is since when the run is paused; `correcting` is what asked
-    for the entry that is open; `why` is the reason of a pause that nobody asked for, of a halt or of a stop.
+    for the entry that is open; `entered` is what the experimenter entered last, behind the number of its step; `why` is
+    the reason of a pause that nobody asked for, of a halt or of a stop.
     """
 
     states: tuple[State, ...] = (S.SAVING,)
@@ -199,6 +200,7 @@ class Position:
     asked_at_onset: bool = False
     paused_s: float | None = None
     correcting: Asking | None = None
+    entered: tuple[int, Event] | None = None
     why: str = ""
 
     @property
@@ -210,6 +212,10 @@ class Position:
     def base(self) -> State:
         """What the session's step is at, whatever lies over it."""
         return self.states[0]
+
+    def entered_for(self, number: int) -> Event | None:
+        """What the experimenter entered for a step, if that was the last that they did."""
+        return self.entered[1] if self.entered is not None and self.entered[0] == number else None
 
     @property
     def held(self) -> bool:

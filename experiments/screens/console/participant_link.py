@@ -24,11 +24,11 @@ from experiments.screens.participant.link import ParticipantError, ParticipantLi
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import place_in_set
 from experiments.session import events
-from experiments.session.events import OwnHand
+from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Describe, Inform, Rate, Step
+from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, Step
 from experiments.study.folders import PlaceError
 from experiments.tasks.questions import choices, first_choices
 
@@ -255,17 +255,15 @@ class ParticipantSide:
             typed=self.covered,
             timed=step.later or not given.stood_still_s,
         )
-        verdict = self._live.offer(key) if self._live is not None else None
-        if verdict is not None and verdict.text:
-            self._tell(Trouble(text=phrase("The participant’s key was not taken. {text}", text=verdict.text)))
-        elif verdict and not key.timed:
+        taken = self._offered(key, step)
+        if taken and not key.timed:
             lost = phrase(
                 "The participant’s screen stood still for {seconds} s: the answer counts, its time does not. Close "
                 "what else runs on this computer.",
                 seconds=f"{given.stood_still_s:.1f}",
             )
             self._tell(Trouble(text=lost, trial=step.trial))
-        return bool(verdict)
+        return taken
 
     def _rated(self, step: Rate, position: Position, wanted: Wanted) -> None:
         number, of = self._place(step)
@@ -286,7 +284,7 @@ class ParticipantSide:
                 wanted=wanted,
             )
             event = events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand)
-            if self._live is None or self._live.offer(event):
+            if self._offered(event, step):
                 return  # else a correction gave that rank to another one meanwhile
 
     def _taken(self, step: Rate) -> tuple[float, ...]:
@@ -305,7 +303,22 @@ class ParticipantSide:
         given = self._link.ask_description(
             messages.AskDescription(number=number, of=of, question=step.text, draft=position.number), wanted=wanted
         )
-        self._offer(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand))
+        self._offered(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand), step)
+
+    def _offered(self, event: OwnHandEvent, step: Asking) -> bool:
+        """Offer what the participant did; whether it was taken. If not, the console says why.
+
+        Until the next trial is answered, if another answer had been entered there: it may have to be corrected.
+        """
+        if self._live is None:
+            return True
+        verdict = self._live.offer(event)
+        if verdict.text:
+            entered = self._live.position.entered_for(event.step)
+            differs = entered is not None and events.answer_of(entered) != events.answer_of(event)
+            text = phrase("The participant’s answer was not taken. {text}", text=verdict.text)
+            self._tell(Trouble(text=text, trial=step.trial if differs else None))
+        return verdict.taken
 
     def _offer(self, event: events.Event) -> None:
         if self._live is not None:
