@@ -209,6 +209,19 @@ UNMASKED = (
     "room. If it is to play, stop, and resume with the noise."
 )
 
+LEFT_OUT = {
+    "participant_screen": (
+        "The participant had a screen of their own in this run until now, and has none any more: from here on the "
+        "experimenter enters what they say. If they are to have it, stop, and resume with their screen."
+    ),
+    "participant_keys": (
+        "The participant had keys of their own in this run until now, and has none any more: from here on no response "
+        "time is theirs. If they are to have them, stop, and resume with their keys."
+    ),
+    "noise": UNMASKED,
+}
+"""What is said where the participant has no more what they had."""
+
 
 def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iterator[str]:
     """What is not as it was until a run broke off, and does not forbid to go on: it is said, and noted in the run."""
@@ -217,8 +230,7 @@ def what_changed(before: Contents | None, request: RunRequest, gun: Gun) -> Iter
     if not request.sensor and any(record.kind == "measured" for record in before.records):
         yield UNMEASURED
     began = next((record for record in reversed(before.records) if record.gun is not None), before.head)
-    if began.noise and not request.options.noise:
-        yield UNMASKED
+    yield from (LEFT_OUT[name] for name, has in request.options.named if getattr(began, name) and not has)
     was, now = gun_felt_last(before), gun.identify()
     if was is not None and was != now:
         yield (

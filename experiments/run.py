@@ -246,7 +246,7 @@ def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, obj
         "gun": asdict(gun.identify()),
         "clock": clock.name,
         **({"sensor": request.sensor} if request.sensor else {}),
-        **({"noise": True} if request.options.noise else {}),
+        **{name: True for name, has in request.options.named if has},
         "experimenter_knows": ["direction", *dampers, *by_hand(setup.config), *_shown_levels(setup.config)],
         **({"preregistration_sha256": frozen} if frozen else {}),
     }

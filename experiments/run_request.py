@@ -28,6 +28,11 @@ class ParticipantOptions:
     monitor: int | None = None
 
     @property
+    def named(self) -> tuple[tuple[str, bool], ...]:
+        """What a journal says that the participant was to have, by its name there."""
+        return ("participant_screen", self.screen), ("participant_keys", self.keys), ("noise", self.noise)
+
+    @property
     def any(self) -> bool:
         """Whether the participant's own process runs at all."""
         return self.screen or self.keys or self.noise

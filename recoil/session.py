@@ -91,7 +91,8 @@ def _how_to_go_on(request: RunRequest) -> str:
     journal = place(request.results, request.participant_id, request.setup.config.experiment).journal
     if not journal.exists():
         return "Nothing of the run had begun."
-    return f"Go on with --resume{way_back_to_gun(journal, request.gun)}."
+    options = "".join(f" --{name.replace('_', '-')}" for name, has in request.options.named if has)
+    return f"Go on with --resume{options}{way_back_to_gun(journal, request.gun)}."
 
 
 def _markers(results: Path, say: Callable[[str], None]) -> AbstractContextManager[None]:

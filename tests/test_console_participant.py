@@ -266,6 +266,7 @@ def test_a_key_that_loses_to_what_the_experimenter_entered_is_on_record_and_said
         screen.until(lambda look: look.says("Saved.") and not look.says(differs))
         code, said = screen.stop()
     assert code == 130, said
+    assert "Go on with --resume --participant-keys." in said
     first, *_ = rows(tmp_path, DIRECTION, "trials")
     assert (first["response"], first["response_source"]) == ("backward", "experimenter")
 

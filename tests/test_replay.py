@@ -17,7 +17,7 @@ from experiments.config.setup import Setup, canonical_json
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
-from experiments.earlier_run import UNMASKED, NotAsItBegan, earlier_run, way_back_to_gun
+from experiments.earlier_run import NotAsItBegan, earlier_run, way_back_to_gun
 from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.record.replay import go_on, history, replay
@@ -529,19 +529,28 @@ def sat(asked: RunRequest, records: int, told: list[str]) -> Path:
 
 
 @pytest.mark.slow
-def test_a_run_that_had_masking_noise_and_goes_on_without_says_so_once_and_has_it_on_record(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("had", "said"),
+    [
+        (ParticipantOptions(noise=True), "Masking noise was asked for in this run until now"),
+        (ParticipantOptions(screen=True), "The participant had a screen of their own in this run until now"),
+        (ParticipantOptions(keys=True), "The participant had keys of their own in this run until now"),
+    ],
+)
+def test_a_run_in_which_the_participant_had_something_and_goes_on_without_says_so_once_and_has_it_on_record(
+    tmp_path: Path, had: ParticipantOptions, said: str
+) -> None:
     told = list[str]()
 
-    def sit(again: Again, records: int, *, noise: bool) -> Path:
-        asked = replace(request("direction", tmp_path, again), options=ParticipantOptions(noise=noise))
-        return sat(asked, records, told)
+    def sit(again: Again, records: int, options: ParticipantOptions) -> Path:
+        return sat(replace(request("direction", tmp_path, again), options=options), records, told)
 
-    sit("ask", 8, noise=True)
-    sit("resume", 16, noise=True)
+    sit("ask", 8, had)
+    sit("resume", 16, had)
     assert told == []
-    sit("resume", 24, noise=False)
-    journal = sit("resume", 32, noise=False)
-    assert told == [UNMASKED]
+    sit("resume", 24, ParticipantOptions())
+    journal = sit("resume", 32, ParticipantOptions())
+    assert [text.startswith(said) for text in told] == [True]
     assert [one["body"]["text"] for one in raw(journal) if one["kind"] == "remark"] == told
 
 

@@ -55,7 +55,8 @@ class Record:
 
     `body` is a step, outcome, shot, remark or a sensor's word as JSON, which their own types read. `shown_s` of an
     outcome is when the console had painted its step, `reason` of a stop is why, `clock` and `gun` of a beginning or a
-    resumption are which, `noise` whether masking noise was asked for; else they are empty.
+    resumption are which, `noise`, `participant_screen` and `participant_keys` whether the participant was to have them;
+    else they are empty.
     """
 
     n: int
@@ -69,6 +70,8 @@ class Record:
     clock: str = ""
     gun: Identity | None = None
     noise: bool = False
+    participant_screen: bool = False
+    participant_keys: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -332,7 +332,7 @@ DISARMS: tuple[type[Event], ...] = (Pause, Stop, EmergencyStop, ParticipantLost,
 """What has the gun disarmed at once, beside the run, where it may be armed; the emergency stop everywhere."""
 
 
-def answer_of(event: Event) -> AnswerValue:
+def answer_said(event: Event) -> AnswerValue:
     """What an event says was answered; `None` if it says nothing, or that there is no answer."""
     match event:
         case Answer(response=said) | ParticipantKey(response=said):

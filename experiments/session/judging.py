@@ -200,7 +200,7 @@ def _entered_first(moment: Moment, event: Event) -> str:
     entered = moment.position.entered_for(event.step) if isinstance(event, OWN_HAND_EVENTS) else None
     if entered is None:
         return ""
-    said, own = events.answer_of(entered), events.answer_of(event)
+    said, own = events.answer_said(entered), events.answer_said(event)
     if said == own:
         return f"“{said}” was entered at the console first: it is the same."
     earlier_s = 0.0
@@ -278,7 +278,7 @@ def refused(event: Event, position: Position, because: str) -> remarks.Refused |
         state=str(position.state),
         because=because,
         by="participant" if own else "experimenter",
-        answer=events.answer_of(event),
+        answer=events.answer_said(event),
     )
 
 

@@ -315,7 +315,7 @@ class ParticipantSide:
         verdict = self._live.offer(event)
         if verdict.text:
             entered = self._live.position.entered_for(event.step)
-            differs = entered is not None and events.answer_of(entered) != events.answer_of(event)
+            differs = entered is not None and events.answer_said(entered) != events.answer_said(event)
             text = phrase("The participant’s answer was not taken. {text}", text=verdict.text)
             self._tell(Trouble(text=text, trial=step.trial if differs else None))
         return verdict.taken
