@@ -18,9 +18,10 @@ from experiments.design.plan import Plan
 from experiments.design.shown_texts import setup_in
 from experiments.record.journal import Contents, JournalError, ShownLanguage, begun, hold_journal, read_journal
 from experiments.record.journal import head as journal_head
-from experiments.record.replay import last_word_on_gun
+from experiments.record.replay import history, last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
+from experiments.session.steps import Answered
 from experiments.study import folders, register
 from experiments.study.changes import changes_told, people_changes, setup_changes
 from experiments.study.folders import Place, PlaceError
@@ -155,6 +156,32 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
         raise PlaceError(
             f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
             "one finished run a participant and experiment, so use another code"
+        )
+
+
+def check_resumable(request: RunRequest) -> None:
+    """`PlaceError` if there is nothing to go on with: a mistyped code is not to begin a run."""
+    where = folders.place(request.results, request.participant_id, request.setup.config.experiment)
+    if not where.journal.exists():
+        raise PlaceError(
+            f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
+            "look at --participant and --results, or leave out --resume to begin one"
+        )
+    _check_same_answerer(request, where)
+
+
+def _check_same_answerer(request: RunRequest, where: Place) -> None:
+    """`PlaceError` if a synthetic participant would go on for a person, or a person for a synthetic one."""
+    contents = begun(where.journal)
+    told = () if contents is None else history(contents)
+    hands = {word.by for _, word in told if isinstance(word, Answered)}
+    if hands and request.simulated != (hands == {"synthetic"}):
+        who, other = (
+            ("a person", "a synthetic participant") if request.simulated else ("a synthetic participant", "you")
+        )
+        raise PlaceError(
+            f"{where.journal}: {who} has answered this run so far, and {other} would go on with it; choose the screen "
+            "that it began at, or another participant"
         )
 
 

@@ -18,16 +18,13 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.shown_texts import letters_of
-from experiments.earlier_run import begun_language, language_begun_in, way_back_to_gun
+from experiments.earlier_run import begun_language, check_resumable, language_begun_in, way_back_to_gun
 from experiments.live_run import RunStopped, Screen
 from experiments.load import language_key
-from experiments.record import replay
-from experiments.record.journal import begun
 from experiments.run import Finished, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
-from experiments.session.steps import Answered
 from experiments.study.balance import journals, unread
 from experiments.study.enrolment import look_alike, not_on_record
 from experiments.study.folders import Place, PlaceError, check_code, known_codes, place
@@ -69,7 +66,7 @@ def run_session(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
     if request.practice and request.again == "resume":
         raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
-        _check_resumable(request)
+        check_resumable(request)
     request = replace(request, language=_language(request, wanted), catalogues=wanted.folder)
     _check_terminal(request)
     _say_beforehand(request)
@@ -129,32 +126,6 @@ def _not_on_record(request: RunRequest) -> Iterator[str]:
         if other := look_alike(code, known_codes(results, read_register(results))):
             yield f"participant {code} is new, and {other} is there: if it is the same person, stop, and use {other}"
         yield from filter(None, [not_on_record(results, code)])
-
-
-def _check_resumable(request: RunRequest) -> None:
-    """`PlaceError` if there is nothing to go on with: a mistyped code is not to begin a run."""
-    where = place(request.results, request.participant_id, request.setup.config.experiment)
-    if not where.journal.exists():
-        raise PlaceError(
-            f"{where.journal}: there is no run of {where.experiment} by {where.participant_id} to resume here; "
-            "look at --participant and --results, or leave out --resume to begin one"
-        )
-    _check_same_kind(request, where)
-
-
-def _check_same_kind(request: RunRequest, where: Place) -> None:
-    """`PlaceError` if a synthetic participant would go on for a person, or a person for a synthetic one."""
-    contents = begun(where.journal)
-    told = () if contents is None else replay.history(contents)
-    hands = {word.by for _, word in told if isinstance(word, Answered)}
-    if hands and request.simulated != (hands == {"synthetic"}):
-        who, other = (
-            ("a person", "a synthetic participant") if request.simulated else ("a synthetic participant", "you")
-        )
-        raise PlaceError(
-            f"{where.journal}: {who} has answered this run so far, and {other} would go on with it; choose the screen "
-            "that it began at, or another participant"
-        )
 
 
 def _language(request: RunRequest, wanted: LanguageOptions) -> Language:
