@@ -616,7 +616,7 @@ def at_one_instant(sitting: Sitting) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("state", [state for state in DUE if state is not S.REARMING])
-def test_what_is_refused_is_in_the_journal_with_state_reason_and_hand(state: State, tmp_path: Path) -> None:
+def test_what_is_refused_is_in_the_journal_with_state_reason_hand_and_answer(state: State, tmp_path: Path) -> None:
     event = events.Answer(response="forward", at_s=0.0) if state is S.RATING else events.Rating(rating=1.0)
     with sat_at(state, tmp_path) as sitting:
         if state is S.RATING:
@@ -628,8 +628,20 @@ def test_what_is_refused_is_in_the_journal_with_state_reason_and_hand(state: Sta
         assert not theirs
         found = remarks(of_journal(sitting), Refused)[-2:]
     assert found == [
-        Refused(event=events.word(type(event)), state=state, because=hers.text, by="experimenter"),
-        Refused(event=events.word(type(key)), state=state, because=theirs.text, by="participant"),
+        Refused(
+            event=events.word(type(event)),
+            state=state,
+            because=hers.text,
+            by="experimenter",
+            answer="forward" if state is S.RATING else 1.0,
+        ),
+        Refused(
+            event=events.word(type(key)),
+            state=state,
+            because=theirs.text,
+            by="participant",
+            answer="backward" if state is S.RATING else 1.0,
+        ),
     ]
 
 
