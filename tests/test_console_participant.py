@@ -160,6 +160,7 @@ def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
         code, said = screen.close()
     assert code == 130, said
     assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
+    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's description: so"]
     answered = [
         body["value"] for record in records(journal) if (body := record.get("body", {})).get("kind") == "answered"
     ]
@@ -241,6 +242,24 @@ def test_a_time_that_is_lost_is_said_until_the_next_trial_is_answered(
     first, second, *_ = rows(tmp_path, DIRECTION, "trials")
     assert "key-time-lost" in first["flags"]
     assert "key-time-lost" not in second["flags"]
+
+
+def test_a_run_that_is_stopped_keeps_where_the_participants_marker_stood(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        screen.participant_shows("RatingPage")
+        click(screen, LEFT_END, LINE_Y)
+        screen.until(lambda look: not look.active)
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        code, said = screen.stop()
+    assert code == 130, said
+    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's rating: 0.0"]
 
 
 def test_a_key_that_loses_to_what_the_experimenter_entered_is_on_record_and_said_until_the_next_trial(

@@ -293,6 +293,8 @@ class Controls:
             typed = typed_line(self._view.typed(field))
             if typed not in ("", self.entered_so_far()):
                 self._live.offer(events.Note(text=f"correction: {typed}", trial=entry.trial))
+        if self._participant is not None:
+            self._participant.keep_draft(self.drawn)
         step, typed = self.drawn.step, typed_line(self._view.take_typed())
         if typed and isinstance(step, Asking):
             self._live.offer(events.Note(text=f"{entry_name(self._live.history, step)}: {typed}", trial=step.trial))

@@ -28,7 +28,7 @@ from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, Step
+from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, Step, what
 from experiments.study.folders import PlaceError
 from experiments.tasks.questions import choices, first_choices
 
@@ -138,6 +138,8 @@ class ParticipantSide:
         """What is to stand there: a text, or a question by the number of its step."""
         self._serial = -1
         self._closed = self._starting = False
+        self._draft: messages.Draft | None = None
+        """What stands on the participant's page and was not given yet."""
         self.covered = False
         """Whether a line or a page of the console takes what is typed: the participant's keys are not told from it."""
 
@@ -312,6 +314,7 @@ class ParticipantSide:
         """
         if self._live is None:
             return True
+        self._draft = None
         verdict = self._live.offer(event)
         if verdict.text:
             entered = self._live.position.entered_for(event.step)
@@ -319,6 +322,15 @@ class ParticipantSide:
             text = phrase("The participant’s answer was not taken. {text}", text=verdict.text)
             self._tell(Trouble(text=text, trial=step.trial if differs else None))
         return verdict.taken
+
+    def keep_draft(self, position: Position) -> None:
+        """Their question goes, or the run does: what they had set or written for it and not given is kept as a note."""
+        draft, step = self._draft, position.step
+        if draft is None or draft.draft != position.number or not isinstance(step, Asking):
+            return
+        self._draft = None
+        if draft.value != "":
+            self._offer(events.Note(text=f"participant's {what(step)}: {draft.value}", trial=step.trial))
 
     def _offer(self, event: events.Event) -> None:
         if self._live is not None:
@@ -331,6 +343,8 @@ class ParticipantSide:
                 self._offer(events.EmergencyStop(by="participant"))
             case messages.Focused():
                 self._see()
+            case messages.Draft():
+                self._draft = word
             case messages.NoiseEnded():
                 self._noise_ends(word.message)
             case messages.KeyPressed() if self._live is not None:

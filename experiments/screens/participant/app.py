@@ -115,6 +115,7 @@ class App:
         self._drafts: Drafts = {}
         """What was set or written and not taken, until something else is asked for."""
         self._asked_for = ("", 0)
+        self._draft: messages.Draft | None = None
 
     def begin(self) -> None:
         """Show an empty window and say that it is ready."""
@@ -137,6 +138,7 @@ class App:
                 self._wire.say(self._stage.unasked.popleft())
             self._keys.poll()
             self._tell_keys()
+            self._tell_draft()
             self._beat()
             self._answer()
             time.sleep(_STEP_S)
@@ -151,6 +153,13 @@ class App:
             self._told_s = math.nextafter(press.pressed_s, math.inf)
             if press.name in self._told:
                 self._wire.say(messages.KeyPressed(name=press.name))
+
+    def _tell_draft(self) -> None:
+        """Say what stands on the page whenever that has changed: the run may stop before it is given."""
+        draft = self._stage.page.draft()
+        if draft not in (None, self._draft):
+            self._draft = draft
+            self._wire.say(draft)
 
     def _beat(self) -> None:
         """Say each second that the window works, and that the noise has ended if it has."""
@@ -190,4 +199,5 @@ class App:
             if isinstance(given, messages.ChoiceGiven):
                 given = replace(given, stood_still_s=self._standstills.around_s(given.pressed_s))
             self._wire.say(given)
+            self._draft = None  # not taken in a pause, it stands there again, and is told again
             self._stage.put(MessagePage(self._stage, self._stage.look.messages.between), keep_keys=page.typed)

@@ -216,6 +216,15 @@ class KeyPressed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Draft:
+    """What is set or written so far on the page of a question, which `draft` names as the question did."""
+
+    value: _Finite | str
+    draft: int
+    kind: Literal["draft"] = "draft"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseEnded:
     """The noise played and plays no more; the message says why and what to do."""
 
@@ -232,7 +241,7 @@ class ScreenFailed:
 
 
 ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
-Unasked = EmergencyPressed | Focused | KeyPressed | NoiseEnded
+Unasked = EmergencyPressed | Focused | KeyPressed | Draft | NoiseEnded
 """What the participant's screen says without being asked."""
 FromParticipant = Ready | Pong | Beat | RatingGiven | DescriptionGiven | ChoiceGiven | NoiseIs | Unasked | ScreenFailed
 

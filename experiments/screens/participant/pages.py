@@ -230,6 +230,10 @@ class RatingPage(Page):
             return None
         return messages.RatingGiven(rating=self._rating, ask=self._asked.ask)
 
+    def draft(self) -> messages.Draft | None:
+        """Where the marker stands."""
+        return None if self._rating is None else messages.Draft(value=self._rating, draft=self._asked.draft)
+
     def leave(self) -> None:
         """Where the marker stands is kept."""
         if self._rating is not None:
@@ -335,6 +339,10 @@ class DescriptionPage(Page):
     def outcome(self) -> messages.DescriptionGiven | None:
         """The description, once it is done."""
         return messages.DescriptionGiven(comment=self._box.text.strip(), ask=self._asked.ask) if self._done else None
+
+    def draft(self) -> messages.Draft:
+        """What was written so far."""
+        return messages.Draft(value=self._box.text.strip(), draft=self._asked.draft)
 
     def leave(self) -> None:
         """No more typing; what was written is kept."""

@@ -76,6 +76,10 @@ class Page:
         """What it comes to: a message to say, or nothing yet."""
         return None
 
+    def draft(self) -> messages.Draft | None:
+        """What was set or written on it so far, if anything was."""
+        return None
+
     def leave(self) -> None:
         """It is taken off the window."""
 
