@@ -244,6 +244,27 @@ def test_a_time_that_is_lost_is_said_until_the_next_trial_is_answered(
     assert "key-time-lost" not in second["flags"]
 
 
+def test_a_question_that_could_not_be_shown_at_the_shot_has_no_time_to_its_answer(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("preparing", trial=1)
+        stand_still(screen.participant_pid)
+        screen.to("asking", trial=1)
+        time.sleep(0.5)
+        os.kill(screen.participant_pid, signal.SIGCONT)
+        screen.participant_shows("ChoicePage")
+        time.sleep(0.5)  # the key itself is stamped well
+        screen.keys.press("Up")
+        screen.until(lambda look: look.state != "asking" and look.says("The participant’s screen stood still for"))
+        code, said = screen.stop()
+    assert code == 130, said
+    first, *_ = rows(tmp_path, DIRECTION, "trials")
+    assert (first["response"], first["response_time_valid"], first["flags"]) == ("forward", "0", "key-time-lost")
+
+
 def test_a_run_that_is_stopped_keeps_where_the_participants_marker_stood(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

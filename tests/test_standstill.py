@@ -39,6 +39,16 @@ def test_a_key_long_before_or_after_a_standstill_is_good(stamped_s: float) -> No
     assert found.around_s(stamped_s) == 0.0
 
 
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "stood_s"), [(0.5, 1.3, 0.52), (0.0, 0.6, 0.59), (0.6, 1.3, 0.0), (1.02, 1.3, 0.0)]
+)
+def test_of_a_standstill_that_part_counts_that_lies_between_two_moments(
+    from_s: float, to_s: float, stood_s: float
+) -> None:
+    found, _ = looked_at(0.01, 1.02, 1.1, 1.15, 1.2, 1.25, 1.3)
+    assert found.within_s(from_s, to_s) == pytest.approx(stood_s)
+
+
 def test_a_standstill_that_nobody_has_seen_the_end_of_counts() -> None:
     found, clock = looked_at(0.01)
     clock.now_s = 0.8

@@ -102,7 +102,7 @@ FLAGS = text_column(
     "computer's date and time went back since the trial before), `at-edge` (a procedure chose the end of its levels, "
     "and may have gone on), `track-over` (not presented, or not again: the track had ended), `not-delivered` (a sensor "
     "says so of the last presentation), `key-time-lost` (the program of the participant's screen stood still for more "
-    "than 0.1 s as the key went down), and the experimenter's own",
+    "than 0.1 s as the key went down, or 0.5 s as its question came), and the experimenter's own",
 )
 TIME_VALID = (
     "1 if the time is the participant's own; 0 if corrected, by the experimenter's hand, over a pause or flagged "

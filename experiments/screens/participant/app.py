@@ -196,8 +196,10 @@ class App:
         """Say what the page came to, if it did, and thank for it. After a page to type on another is likely to come."""
         page = self._stage.page
         if (given := page.outcome()) is not None:
-            if isinstance(given, messages.ChoiceGiven):
-                given = replace(given, stood_still_s=self._standstills.around_s(given.pressed_s))
+            if isinstance(given, messages.ChoiceGiven) and isinstance(page, ChoicePage):
+                asked_s, seen_s = page.unseen_s
+                unseen_s = self._standstills.within_s(asked_s, min(seen_s, given.pressed_s))
+                given = replace(given, stood_still_s=max(unseen_s, self._standstills.around_s(given.pressed_s)))
             self._wire.say(given)
             self._draft = None  # not taken in a pause, it stands there again, and is told again
             self._stage.put(MessagePage(self._stage, self._stage.look.messages.between), keep_keys=page.typed)

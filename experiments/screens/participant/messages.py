@@ -173,7 +173,10 @@ class DescriptionGiven:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChoiceGiven:
-    """Which answer, and when its key went down; `stood_still_s`: by how much that may be too late, as nobody looked."""
+    """Which answer, and when its key went down; `stood_still_s`: by how much that may be too late, as nobody looked.
+
+    Or by how much too late the question may have been seen.
+    """
 
     response: str
     pressed_s: _Finite

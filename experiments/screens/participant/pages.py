@@ -40,6 +40,7 @@ class ChoicePage(Page):
     def __init__(self, stage: Stage, asked: messages.AskChoice, keys: KeyPresses) -> None:
         self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
         self._since_s = math.inf if asked.once_seen else asked.onset_s
+        self._seen_s = math.inf
         all_across, ink = 2 * stage.half_width, stage.palette.ink
         width = all_across / len(asked.answers)
         question = TextBox(y=0.4, width=all_across, height=0.25)
@@ -57,8 +58,14 @@ class ChoicePage(Page):
         """The question and its answers."""
         for stimulus in self._drawn:
             stimulus.draw()
+        self._seen_s = min(self._seen_s, self._now())
         if math.isinf(self._since_s):
-            self._since_s = max(self._now(), self._asked.onset_s)
+            self._since_s = max(self._seen_s, self._asked.onset_s)
+
+    @property
+    def unseen_s(self) -> tuple[float, float]:
+        """From when on it was asked, and since when it stands there."""
+        return self._asked.onset_s, self._seen_s
 
     def outcome(self) -> messages.ChoiceGiven | None:
         """The first of the answers' keys since the onset."""

@@ -1,4 +1,7 @@
-"""When the whole program stood still: swapped out, stopped or starved. Keys pressed meanwhile are stamped too late."""
+"""When the whole program stood still: swapped out, stopped or starved.
+
+Keys pressed meanwhile are stamped too late, and a question that was to be shown meanwhile is seen too late.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,9 @@ from collections.abc import Callable
 
 LONGEST_STANDSTILL_S = 0.1
 """How long the program may stand still: less is little beside how people differ from trial to trial."""
+
+LONGEST_UNSEEN_S = 0.5
+"""How long while a question comes: its page takes up to 0.3 s to draw at first, in which nothing else runs."""
 
 _LOOK_S = 0.01
 _KEPT = 64
@@ -38,9 +44,17 @@ class Standstills:
 
         A key may be stamped before the thread has looked again: what is missing until now counts too.
         """
-        missed = [*self._missed, (self._seen_s, self._now())]
-        near = (end - start for start, end in missed if start <= stamped_s <= end + LONGEST_STANDSTILL_S)
+        near = (end - start for start, end in self._all if start <= stamped_s <= end + LONGEST_STANDSTILL_S)
         return max((stood_s for stood_s in near if stood_s > LONGEST_STANDSTILL_S), default=0.0)
+
+    def within_s(self, from_s: float, to_s: float) -> float:
+        """For how long at a time the program stood still while a page came, in seconds: 0 if it did not."""
+        stood = (min(end, to_s) - max(start, from_s) for start, end in self._all)
+        return max((stood_s for stood_s in stood if stood_s > LONGEST_UNSEEN_S), default=0.0)
+
+    @property
+    def _all(self) -> list[tuple[float, float]]:
+        return [*self._missed, (self._seen_s, self._now())]
 
     def _watch(self) -> None:
         while True:
