@@ -1358,6 +1358,17 @@ def test_a_pause_that_was_asked_for_and_one_that_was_not_are_told_apart(tmp_path
     assert remarks(contents, Paused) == [Paused(), Paused(cause="its process ended")]
 
 
+def test_a_participants_screen_that_is_lost_in_a_pause_is_on_record_too(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.ASKING)
+        by_hand(sitting, events.Pause())
+        sitting.live.offer(events.ParticipantLost(cause="its window was closed"))
+        sitting.live.offer(events.ParticipantBack())
+        contents = of_journal(sitting)
+    noted = [word.text for word in remarks(contents, Noted) if isinstance(word, Noted)]
+    assert noted == ["its window was closed", "The participant's screen was started again."]
+
+
 # what a hand does in passing
 
 

@@ -250,6 +250,8 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
             return remarks.Noted(trial=None, text="The participant's screen was started again.")
         case events.ParticipantLost() if before.paused_s is None and then.paused_s is not None:
             return remarks.Paused(cause=event.cause)
+        case events.ParticipantLost():
+            return remarks.Noted(trial=None, text=event.cause)
         case events.GoOn():
             return remarks.Continued(paused_s=round(then.since_s - (before.paused_s or before.since_s), 3))
         case _:
