@@ -136,14 +136,20 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             case view.GunSeen():
                 self.gun = message
             case view.ParticipantSeen():
-                self.participant = message
-                if message.failure:
-                    self._forget_good()
+                self._see_participant(message)
             case view.Trouble():
                 self._trouble(message)
             case view.Ended():
                 self._end(message)
         self._show_soon()
+
+    def _see_participant(self, seen: view.ParticipantSeen) -> None:
+        """How the participant's screen stands; one that was started again came with the keys."""
+        if self.participant is not None and self.participant.starting and not seen.starting:
+            self.activateWindow()
+        self.participant = seen
+        if seen.failure:
+            self._forget_good()
 
     def _show_soon(self) -> None:
         if not self._soon.isActive():
