@@ -126,7 +126,7 @@ def load_gun(path: Path) -> GunConfig:
     return load(GunConfig, path)
 
 
-def load_study(name: str) -> tuple[StudyConfig, Path]:
+def load_study(name: str | Path) -> tuple[StudyConfig, Path]:
     """A study's config and the folder it lies in."""
     path = find(name)
     return load(StudyConfig, path), path.parent

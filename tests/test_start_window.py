@@ -316,6 +316,42 @@ def test_start_chooses_who_was_entered_and_has_their_facts_on_record(study: Stud
     assert read_register(study.results).members["P01"].facts == FACTS
 
 
+def test_a_run_begins_with_the_configs_as_they_are_when_start_is_pressed(study: StudyFolder, opened: Open) -> None:
+    window = opened()
+    design = study.setups[0].source
+    design.write_text(design.read_text().replace("answer_s = 1.2", "answer_s = 1.3"))
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert window.choice is not None
+    assert window.choice.setup.config == load_setup(design).config != study.setups[0].config
+
+
+EDITED: dict[str, tuple[str, str, str, str]] = {
+    "a config that cannot be used": ("direction.toml", "answer_s = 1.2", "answer_s = -1.2", "timing.answer_s"),
+    "another experiment": ("study.toml", ', "preference.toml"', "", "not those that this window opened with"),
+    "something else asked": ("study.toml", '"sex", ', "", "not those that this window opened with"),
+}
+
+
+@pytest.mark.parametrize("edit", EDITED)
+@pytest.mark.parametrize("press", ["Return", "P", "R", "T"])
+def test_nothing_begins_while_the_configs_cannot_be_used_or_are_those_of_another_window(
+    press: str, edit: str, study: StudyFolder, opened: Open
+) -> None:
+    window = opened()
+    name, before, after, words = EDITED[edit]
+    config = study.source.parent / name
+    assert before in config.read_text()
+    config.write_text(config.read_text().replace(before, after, 1))
+    fill(window, "P01")
+    key(window, press, CTRL)
+    assert words in said(window)
+    assert window.choice is None
+    assert not window.shots.is_running
+    assert entries(study) == []
+    assert words in said(opened())
+
+
 def test_the_language_is_chosen_where_there_are_several_and_chinese_says_that_nobody_checked_it(opened: Open) -> None:
     alone = opened()
     assert not alone.form.languages.isVisible()

@@ -200,6 +200,12 @@ def _loaded(name: str, results: Path) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=results)
 
 
+def read_anew(study: StudyFolder) -> StudyFolder:
+    """A study by its files as they are now. `ConfigError`, if they cannot be used."""
+    config, _ = load_study(study.source)
+    return replace(study, config=config, setups=tuple(load_setup(setup.source) for setup in study.setups))
+
+
 def overview(study: StudyFolder) -> Overview:
     """How a study stands. What cannot be read is a problem in the list, never an exception."""
     look = _Look(study, register.read_register(study.results))

@@ -240,7 +240,7 @@ class ShotPage(QWidget):
 
     def choose(self, setup: Setup[DesignConfig]) -> None:
         """Test the methods of an experiment, from the first on."""
-        if self._setup is not setup:
+        if self._setup != setup:
             self._setup, self._method_at = setup, 0
 
     def next_text(self) -> str:

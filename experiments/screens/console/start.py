@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
 
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import QEventLoop, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 
+from device.messages import RecoilError
 from experiments.clock import Clock
+from experiments.config.door import ConfigError
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.record.journal import JournalError
@@ -19,10 +23,11 @@ from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.phrases import phrase
 from experiments.study import enrolment
-from experiments.study.folders import Overview, PlaceError, StudyFolder, overview
+from experiments.study.folders import Overview, PlaceError, StudyFolder, overview, read_anew
 from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
+_Found = TypeVar("_Found")
 SIMULATED = "simulated"
 NOTHING_ARMED = phrase("F12 is heard. Nothing is armed here: it stops test shots, practices and runs.")
 STOPPED = phrase("The last test shot ended by an emergency stop.")
@@ -107,9 +112,26 @@ class StartWindow(QtWidgets.QWidget):
 
     def _fill(self) -> None:
         """Look at the study, and show how it stands."""
-        self._seen: Overview = overview(self._study)
+        unread: list[str] = []
+        try:
+            self._read_anew()
+        except RecoilError as error:
+            unread += str(error).splitlines()
+        seen = overview(self._study)
+        self._seen: Overview = replace(seen, problems=tuple(dict.fromkeys([*unread, *seen.problems])))
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
+
+    def _read_anew(self) -> None:
+        """Have the study as its files are now. `ConfigError`; `PlaceError`, if this window's fields are another's."""
+        before, now = self._study, read_anew(self._study)
+        fields = [(one.experiments, one.config.experiments, one.config.eligibility.ask) for one in (before, now)]
+        if fields[0] != fields[1]:
+            raise PlaceError(
+                f"{before.source}: the experiments, or what participants are asked, are not those that this window "
+                "opened with: quit, and start it again"
+            )
+        self._study = now
 
     def _say_first(self, opening: Opening) -> None:
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
@@ -213,18 +235,21 @@ class StartWindow(QtWidgets.QWidget):
             self._leave(self.form.participant_id, practice=True)
 
     def _training(self) -> None:
-        self._leave("training", practice=True, training=True)
+        if self._checked(lambda: True):
+            self._leave("training", practice=True, training=True)
 
     def _admit(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
         entered = self.form.entered()
         return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
 
-    def _checked(self, check: Callable[[], RunProgress]) -> RunProgress | None:
+    def _checked(self, check: Callable[[], _Found]) -> _Found | None:
+        """What a check found by the files as they are now; `None`, with the reason shown, if it refused."""
         self._take_back()
         try:
+            self._read_anew()
             return check()
-        except (PlaceError, JournalError) as error:
+        except (ConfigError, PlaceError, JournalError) as error:
             self._refused(str(error))
             return None
 
@@ -350,10 +375,11 @@ class StartWindow(QtWidgets.QWidget):
             self._enter_shots()
 
     def _enter_shots(self) -> None:
-        self._take_back()
-        self.pages.setCurrentWidget(self.shots)
-        self.shots.enter()
-        self.shots.begin()
+        if self._checked(lambda: True):
+            self.shots.choose(self._setup())
+            self.pages.setCurrentWidget(self.shots)
+            self.shots.enter()
+            self.shots.begin()
 
     def _shot_over(self) -> None:
         if self._closing:
