@@ -24,7 +24,7 @@ from experiments.run_request import RunRequest
 from experiments.session.steps import Answered
 from experiments.study import folders, register
 from experiments.study.changes import changes_told, people_changes, setup_changes
-from experiments.study.folders import Place, PlaceError
+from experiments.study.folders import RETEST, Place, PlaceError
 from experiments.written_tables import answers_in
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _refuse_finished(where: Place, contents: Contents | None) -> None:
     if contents is not None and contents.finished and not where.practice:
         raise PlaceError(
             f"participant {where.participant_id} has finished {where.experiment}: {where.journal}; "
-            "one finished run a participant and experiment, so use another code"
+            f"one finished run a participant and experiment; {RETEST}"
         )
 
 

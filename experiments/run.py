@@ -157,7 +157,7 @@ def _refuse_person(request: RunRequest, place: Place, registered: Register) -> N
     if reason is not None:
         raise PlaceError(
             f"participant {place.participant_id} is excluded ({reason}); "
-            "readmit them with `recoil study`, or use another code"
+            "readmit them with `recoil study`; somebody else has a code of their own"
         )
 
 

@@ -99,7 +99,12 @@ def test_a_code_has_to_be_read_back_as_it_stands(code: str, again: str, may: boo
     [
         (someone("not begun", "not begun"), FACTS, False, ""),
         (someone("in progress", "not begun"), FACTS, False, ""),
-        (someone("done", "not begun"), FACTS, False, "P01 has finished direction"),
+        (
+            someone("done", "not begun"),
+            FACTS,
+            False,
+            "P01 has finished direction; one finished run a participant and experiment: choose another experiment; a retest",
+        ),
         (someone("done", "not begun"), FACTS, True, ""),
         (someone("open elsewhere", "not begun"), FACTS, False, "P01 sits at another console, where direction is open"),
         (someone("not begun", "open elsewhere"), FACTS, False, "P01 sits at another console, where preference is open"),

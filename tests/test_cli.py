@@ -129,7 +129,7 @@ def test_a_participant_who_has_finished_is_refused_and_nothing_changes(recoil: R
     synthetic(recoil)
     before = {name: (tmp_path / name).read_bytes() for name in (TABLE, JOURNAL)}
     for again in ((), ("--resume",), ("--fresh",)):
-        refused(synthetic(recoil, *again), "P01 has finished direction", "use another code")
+        refused(synthetic(recoil, *again), "P01 has finished direction", "a retest is a copy of the config")
     assert before == {name: (tmp_path / name).read_bytes() for name in (TABLE, JOURNAL)}
 
 

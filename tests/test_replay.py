@@ -626,7 +626,7 @@ def test_a_run_that_another_process_is_at_cannot_be_set_aside(unbroken: dict[str
 def test_a_finished_run_is_never_done_again(again: Again, unbroken: dict[str, Unbroken], tmp_path: Path) -> None:
     whole = unbroken["preference"]
     journal = broken_off(whole, tmp_path, len(whole.lines))
-    with pytest.raises(PlaceError, match=r"has finished preference: .*use another code"):
+    with pytest.raises(PlaceError, match=r"has finished preference: .*a retest is a copy of the config"):
         run(request("preference", tmp_path, again), synthetic_screen, VirtualClock())
     assert journal.read_bytes() == b"".join(whole.lines)
 

@@ -16,7 +16,7 @@ from experiments.config.door import ConfigError, EligibilityConfig, Fact
 from experiments.load import load_study
 from experiments.record.journal import JournalError
 from experiments.study import folders, register
-from experiments.study.folders import PlaceError, StudyFolder, look_at
+from experiments.study.folders import RETEST, PlaceError, StudyFolder, look_at
 from experiments.study.preregistration import STUDY_FILE
 from experiments.study.register import RegisterError
 from experiments.study.study import Facts, Participant, RunProgress, eligible, unanswered, unasked
@@ -99,13 +99,13 @@ def enrolment_refusal(
     elsewhere = [run.experiment for run in person.runs if run.state == "open elsewhere"]
     missing, reasons = unanswered(facts, rules), eligible(facts, rules)
     if person.excluded is not None:
-        return f"{code} is excluded ({person.excluded}): readmit them first, or use another code."
+        return f"{code} is excluded ({person.excluded}): readmit them first; somebody else has a code of their own."
     if elsewhere:
         return f"{code} sits at another console, where {elsewhere[0]} is open: close it there first."
     if not practice and run_of(person, entered.experiment).state == "done":
         return (
-            f"{code} has finished {entered.experiment}; one finished run a participant and experiment, so choose "
-            "another experiment or another code."
+            f"{code} has finished {entered.experiment}; one finished run a participant and experiment: choose another "
+            f"experiment; {RETEST}."
         )
     if missing:
         return f"The study asks for what was not given: {', '.join(map(fact_text, missing))}."

@@ -48,6 +48,9 @@ class PlaceError(RecoilError):
     """A participant or folder that cannot be used; the message names value and rule."""
 
 
+RETEST = "a retest is a copy of the config under another name (key design), and somebody else has a code of their own"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
     """The files of one participant in one experiment."""
@@ -117,7 +120,7 @@ def check_case(results: Path, participant_id: str, known: Iterable[str]) -> None
         if code != participant_id and code.lower() == participant_id.lower():
             raise PlaceError(
                 f"participant code {participant_id!r} differs from {code!r} in {results} in case alone; "
-                f"use {code!r} or another code"
+                f"use {code!r} if it is the same person, else another code"
             )
 
 

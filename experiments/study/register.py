@@ -202,7 +202,7 @@ def _refuse_twin(before: Register, one: RegisterEntry) -> None:
         if known != one.participant_id and known.lower() == one.participant_id.lower():
             raise RegisterError(
                 f"participant code {one.participant_id!r} differs from {known!r} in {before.path} in case alone; "
-                f"use {known!r} or another code"
+                f"use {known!r} if it is the same person, else another code"
             )
 
 
