@@ -275,13 +275,13 @@ def test_whiskers_of_numbers_are_said_to_be_of_their_logarithms():
         assert section.pictures[0].caption.endswith(f" Whiskers: {said}.")
 
 
+def d_prime(hits, signals, alarms, noises):  # Hautus 1995
+    return float(np.diff(stats.norm.ppf([(alarms + 0.5) / (noises + 1), (hits + 0.5) / (signals + 1)]))[0])
+
+
 def test_d_prime_is_said_to_be_pooled_and_stands_beside_the_mean_of_the_participants_own():
     found = summarise(detection(VOLTS), answered(SAID))
     tests = {(test.name, test.effect): test for test in found.questions["felt"].tests}
-
-    def d_prime(hits, signals, alarms, noises):  # Hautus 1995
-        return float(np.diff(stats.norm.ppf([(alarms + 0.5) / (noises + 1), (hits + 0.5) / (signals + 1)]))[0])
-
     assert tests["d_prime", "stimulus"].statistic == pytest.approx(d_prime(47, 96, 3, 24), rel=1e-9)
     assert tests["d_prime", "voltage_V 6"].statistic == pytest.approx(d_prime(5, 48, 3, 24), rel=1e-9)
     own, mean = np.array([d_prime(21, 48, 1, 12), d_prime(26, 48, 2, 12)]), tests["d_prime_mean", "stimulus"]
@@ -295,14 +295,64 @@ def test_d_prime_is_said_to_be_pooled_and_stands_beside_the_mean_of_the_particip
     assert f"participants' own: M = {own.mean():.2f}, 95 % CI [" in sentence
     by_test = tables_of(found)[1]
     assert by_test.caption.endswith(
-        "pooled is what is of all participants' answers together, with the log-linear correction"
+        "pooled is what is of all participants' answers together, with the log-linear correction; false alarms of "
+        "every condition: those of all catch trials"
     )
     assert [row[:2] for row in by_test.rows if row[0].startswith("d′")] == [
         ("d′, pooled", "all conditions"),
         ("d′, pooled", "6 V"),
         ("d′, pooled", "10 V"),
         ("d′, mean of participants", "all conditions"),
+        ("d′, mean of participants", "6 V"),
+        ("d′, mean of participants", "10 V"),
     ]
+
+
+SAYS_YES_TO_THE_OTHER = {("P1", "a"): (9, 3), ("P2", "a"): (8, 2), ("P1", "b"): (12, 11), ("P2", "b"): (10, 9)}
+
+
+def by_session(said):
+    """Rows of detection by session: of each (person, method) so many yes to 12 shots of 6 V, and to 12 catch trials."""
+    rows = [
+        {"participant_id": person, "method": method, "voltage_V": volts, "felt": answer, "stimulus": int(volts > 0)}
+        for (person, method), yes in said.items()
+        for count, volts in zip(yes, (6.0, math.nan), strict=True)
+        for answer in ["yes"] * count + ["no"] * (12 - count)
+    ]
+    table = pd.DataFrame(rows)
+    return table.assign(correct=((table["felt"] == "yes") == (table["stimulus"] == 1)).astype(int))
+
+
+def by_method(table):
+    factors = {"method": {"levels": ["a", "b"]}, "voltage_V": {"levels": [6.0, 10.0]}}
+    found = summarise(detection(factors, order={"session": ["method"]}), table)
+    return found, {(test.name, test.effect): test for test in found.questions["felt"].tests}
+
+
+def test_a_condition_has_the_false_alarms_of_its_own_session_and_not_of_all():
+    """Who says yes to nearly everything in a session has a lower criterion there, and no higher d′."""
+    found, tests = by_method(by_session(SAYS_YES_TO_THE_OTHER))
+    for effect, counts in {"method a": (17, 24, 5, 24), "method b, voltage_V 6": (22, 24, 20, 24)}.items():
+        assert tests["d_prime", effect].statistic == pytest.approx(d_prime(*counts), rel=1e-9)
+    own = np.array([d_prime(12, 12, 11, 12), d_prime(10, 12, 9, 12)])
+    assert tests["d_prime_mean", "method b, voltage_V 6"].statistic == pytest.approx(own.mean(), rel=1e-9)
+    assert tests["d_prime", "stimulus"].statistic == pytest.approx(d_prime(39, 48, 25, 48), rel=1e-9)
+    assert tables_of(found)[1].caption.endswith("false alarms of a condition: those of catch trials of the same method")
+    (announced,) = sentences_of_tests(detection(VOLTS | {"method": {"levels": ["a", "b"]}}))
+    assert "of each condition, with the false alarms of all catch trials;" in announced
+    design = detection(VOLTS | {"method": {"levels": ["a", "b"]}}, order={"session": ["method"]})
+    (announced,) = sentences_of_tests(design)
+    assert "of each condition, with the false alarms of the same method;" in announced
+
+
+def test_a_condition_without_catch_trials_of_its_own_has_the_false_alarms_of_all_and_the_table_says_so():
+    table = by_session(SAYS_YES_TO_THE_OTHER)
+    found, tests = by_method(table[(table["method"] == "a") | (table["stimulus"] == 1)])
+    assert tests["d_prime", "method a, voltage_V 6"].statistic == pytest.approx(d_prime(17, 24, 5, 24), rel=1e-9)
+    assert tests["d_prime", "method b, voltage_V 6"].statistic == pytest.approx(d_prime(22, 24, 5, 24), rel=1e-9)
+    own = np.array([d_prime(12, 12, 3, 12), d_prime(10, 12, 2, 12)])
+    assert tests["d_prime_mean", "method b, voltage_V 6"].statistic == pytest.approx(own.mean(), rel=1e-9)
+    assert tables_of(found)[1].caption.endswith("the same method, but of all catch trials for b, 6 V, which had none")
 
 
 def test_a_condition_of_several_factors_is_called_by_its_levels_beside_its_d_prime():

@@ -14,6 +14,7 @@ from analysis.summary.designs import varied
 from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig
+from experiments.design.methods_section import joined_by_and
 from experiments.design.procedure_problems import has_success
 from experiments.tasks.questions import chance
 
@@ -114,9 +115,9 @@ def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
         "friedman": f"Friedman's test of {factors}",
         "tukey": "Tukey's HSD of all pairs with its pooled error term",
         "exponent": f"the exponent of the power law over {powers}, tested against 0",
-        "d_prime": "d′ of all answers together and of each condition",
+        "d_prime": f"d′ of all answers together and of each condition{_false_alarms(design, question)}",
         "criterion": "and the criterion",
-        "d_prime_mean": "the mean of the participants' own d′ with its 95 % interval",
+        "d_prime_mean": "the means of the participants' own d′ with their 95 % intervals",
     }
     names = names_of_tests(design, question)
     held = bool(design.adapted) and has_success(question)
@@ -136,6 +137,14 @@ def _sentences(design: DesignConfig, question: QuestionConfig) -> Iterator[str]:
         yield "hits of each condition, and correct rejections, with their exact 95 % intervals over all answers"
     if not (names or held) and by_chance is None:
         yield "it is described, not tested"
+
+
+def _false_alarms(design: DesignConfig, question: QuestionConfig) -> str:
+    """Which catch trials a condition of a detection is held against."""
+    if question.correct != "stimulus":
+        return ""
+    same = [name for name in varied(design) if name in (*design.between, *design.order.session)]
+    return f", with the false alarms of {f'the same {joined_by_and(same)}' if same else 'all catch trials'}"
 
 
 def _score(question: QuestionConfig) -> str:

@@ -134,11 +134,12 @@ def _question(design: DesignConfig, name: str, question: QuestionConfig, table: 
     scored, people = found.scored, found.people
     apart = [*factors, *(["stimulus"] if "stimulus" in scored else [])]
     cells = _ordered(design, (_cell(design, name, question, some) for some in _conditions(scored, apart)))
-    there = sorted(_conditions(found.real, factors), key=lambda some: _place(design, _levels(design, some)))
-    conditions = {_named_condition(some, factors): some for some in there if factors}
+    caught = scored[scored["stimulus"].astype(int) == 0] if question.correct == "stimulus" else scored.iloc[:0]
+    apart_in = [factor for factor in factors if caught[factor].notna().any()]
+    conditions = {**_named(design, found.real, apart_in), **_named(design, found.real, factors)}
     tests = (
         *condition_tests(design, question, people, _groups(design, found.real)),
-        *(() if design.adapted else sensitivity(design.trial, question, scored, conditions)),
+        *(() if design.adapted else sensitivity(design.trial, question, scored, conditions, factors)),
     )
     return QuestionSummary(
         kind=question.kind,
@@ -313,6 +314,15 @@ def _groups(design: DesignConfig, rows: pd.DataFrame) -> pd.Series | None:
     if len(design.between) != 1:
         return None
     return rows.groupby("participant_id")[design.between[0]].first()
+
+
+def _named(design: DesignConfig, rows: pd.DataFrame, factors: Sequence[str]) -> dict[str, pd.DataFrame]:
+    """The rows of each condition of these factors by its name, in the design's order; none without a factor."""
+
+    def place(some: pd.DataFrame) -> list[int]:
+        return _place(design, {name: level for name, level in _levels(design, some).items() if name in factors})
+
+    return {_named_condition(some, factors): some for some in sorted(_conditions(rows, factors), key=place) if factors}
 
 
 def _named_condition(rows: pd.DataFrame, factors: Sequence[str]) -> str:

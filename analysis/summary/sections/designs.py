@@ -336,9 +336,28 @@ def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Itera
         rows = tuple((*_test(found, question, test), _standing(question, test)) for test in question.tests)
         note = f"; {_PLANNED}" if any(row[-1] == "planned" for row in rows) else ""
         note += f"; {_POOLED}" if any(test.name == "d_prime" for test in question.tests) else ""
-        note += ", with the log-linear correction" if question.detected and _POOLED in note else ""
+        note += _false_alarms_of(found, question) if question.detected and _POOLED in note else ""
         note += _of_pairs(question) if any(test.name == "tukey" for test in question.tests) else ""
         yield Table(caption=f"{name}: tests{note}", header=header, rows=rows)
+
+
+def _false_alarms_of(found: DesignSummary, question: QuestionSummary) -> str:
+    """How d′ of a detection was corrected, and by which catch trials each condition has its false alarms."""
+    caught = [cell.levels for cell in question.cells if cell.catch]
+    same = list(dict.fromkeys(name for levels in caught for name in levels))
+    signals = [cell for cell in question.cells if not cell.catch]
+    lacking = [
+        _condition(found, cell)
+        for cell in signals
+        if same and not any(levels.items() <= cell.levels.items() for levels in caught)
+    ]
+    told = ", with the log-linear correction"
+    if same:
+        factors = joined_by_and([*map(factor_words, same)])
+        told += f"; false alarms of a condition: those of catch trials of the same {factors}"
+    elif len(signals) > 1:
+        told += "; false alarms of every condition: those of all catch trials"
+    return told + (f", but of all catch trials for {joined_by_and(lacking)}, which had none" if lacking else "")
 
 
 def _of_pairs(question: QuestionSummary) -> str:
