@@ -12,8 +12,10 @@ from analysis.report.section import Section, Table
 from analysis.report.terminal import with_tables
 from device.messages import how_many
 from experiments.clock import RealClock, date_text
+from experiments.screens.console.people import doubt_text
 from experiments.study import enrolment
-from experiments.study.folders import Overview, PlaceError, StudyFolder, open_study, overview
+from experiments.study.folders import Overview, PlaceError, StudyFolder, known_codes, open_study, overview
+from experiments.study.register import read_register
 from experiments.study.study import Facts, Participant, RunProgress, eligible, taking_part
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
@@ -79,8 +81,13 @@ def study(folder: Path, change: StudyChange | None) -> tuple[StudyStatus, tuple[
 def _carry_out(where: StudyFolder, change: StudyChange) -> tuple[str, ...]:
     clock, code = RealClock(), change.participant_id
     if change.action == "join":
+        known = known_codes(where.results, read_register(where.results))
         reasons = enrolment.join(where, code, change.facts, clock)
-        return tuple(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons)
+        doubt = doubt_text(code, known, where.config.code_prefix)
+        return (
+            *([f"{doubt} It is recorded; --exclude {code} leaves it out"] if doubt else []),
+            *(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons),
+        )
     act = enrolment.exclude if change.action == "exclude" else enrolment.readmit
     act(where.results, code, change.reason, clock)
     return ()

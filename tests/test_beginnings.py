@@ -103,7 +103,8 @@ def test_a_code_has_to_be_read_back_as_it_stands(code: str, again: str, may: boo
             someone("done", "not begun"),
             FACTS,
             False,
-            "P01 has finished direction; one finished run a participant and experiment: choose another experiment; a retest",
+            "P01 has finished direction; one finished run a participant and experiment: choose another "
+            "experiment; a retest is a copy of the config",
         ),
         (someone("done", "not begun"), FACTS, True, ""),
         (someone("open elsewhere", "not begun"), FACTS, False, "P01 sits at another console, where direction is open"),

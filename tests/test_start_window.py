@@ -181,6 +181,8 @@ def test_a_code_that_is_typed_sets_the_first_experiment_that_they_have_not_done(
     window.form.code.clear()
     QTest.keyClicks(window.form.code, "P1")
     assert remark(window) == "P1 is new, and P01 is there: is it the same person?"
+    window.form.code.setText("X99")
+    assert remark(window) == "X99 is new, and the codes of this study begin with P: is it right?"
     window.form.code.clear()
     QTest.keyClicks(window.form.code, "P01")
     assert experiment(window) == "preference"

@@ -262,6 +262,20 @@ def test_who_joins_has_facts_and_comes_next(recoil: Recoil, pilot: Path) -> None
     assert (pilot / "results" / "participants.jsonl").stat().st_mode & 0o077 == 0
 
 
+@pytest.mark.parametrize(
+    ("code", "doubt"),
+    [("P1", "P1 is new, and P01 is there"), ("X99", "X99 is new, and the codes of this study begin with P")],
+)
+def test_who_joins_with_a_code_that_may_be_mistyped_is_asked_about(
+    code: str, doubt: str, recoil: Recoil, pilot: Path
+) -> None:
+    assert recoil("study", "pilot", "--join", "P01", *RIGHT).stderr == ""
+    done = recoil("study", "pilot", "--join", code, *RIGHT)
+    assert done.returncode == 0
+    assert doubt in done.stderr
+    assert recoil("study", "pilot", "--join", code, *RIGHT).stderr == ""
+
+
 def test_facts_are_corrected_and_then_told_if_they_break_a_rule(recoil: Recoil, pilot: Path) -> None:
     recoil("study", "pilot", "--join", "P01", *RIGHT)
     done = recoil("study", "pilot", "--join", "P01", "--age", 35, *RIGHT[2:])

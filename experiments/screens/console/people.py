@@ -97,15 +97,19 @@ def named_text(named: str, code: str, person: Participant | None, experiment: st
     )
 
 
-def remark(
-    code: str, person: Participant | None, experiment: str, experiments: Sequence[str], known: Sequence[str] = ()
-) -> tuple[str, str]:
-    """What there is to know before somebody does an experiment, and a word that chooses the colour.
+def doubt_text(code: str, known: Sequence[str], prefix: str) -> str:
+    """Why a code may be mistyped, by those that are known and by the study's prefix; else empty."""
+    if other := look_alike(code, known):
+        return phrase("{code} is new, and {other} is there: is it the same person?", code=code, other=other)
+    if is_code(code) and code not in known and not code.startswith(prefix):
+        return phrase(
+            "{code} is new, and the codes of this study begin with {prefix}: is it right?", code=code, prefix=prefix
+        )
+    return ""
 
-    `known`: the codes that are there.
-    """
-    if person is None and (other := look_alike(code, known)):
-        return phrase("{code} is new, and {other} is there: is it the same person?", code=code, other=other), "ask"
+
+def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:
+    """What there is to know before somebody does an experiment, and a word that chooses the colour."""
     return next(_remarks(code, person, experiment, experiments))
 
 

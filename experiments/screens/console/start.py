@@ -163,7 +163,9 @@ class StartWindow(QtWidgets.QWidget):
         code, experiment = self.form.participant_id, self.form.experiment.currentText()
         person = self._person(code)
         known = [one.participant_id for one in self._seen.participants]
-        self.form.remark.say(*people.remark(code, person, experiment, self._study.experiments, known))
+        doubt = people.doubt_text(code, known, self._study.config.code_prefix)
+        said = (doubt, "ask") if doubt else people.remark(code, person, experiment, self._study.experiments)
+        self.form.remark.say(*said)
         out = person is not None and person.excluded is not None
         self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
         self.shots.choose(self._setup())
