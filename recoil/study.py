@@ -114,6 +114,7 @@ def _participant(found: StudyStatus, one: Participant) -> dict[str, object]:
         "joined_utc": one.joined_utc or None,
         "excluded": one.excluded,
         "not_eligible": list(_not_eligible(found, one)),
+        "order_broken": list(enrolment.order_broken(one)),
         "experiments": {run.experiment: _run(run) for run in one.runs},
     }
 
@@ -146,7 +147,9 @@ def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
     for run in one.runs:
         yield _state(run)
     excluded = [] if one.excluded is None else [f"excluded: {one.excluded}"]
-    yield "\n".join([*excluded, *(f"not eligible: {reason}" for reason in _not_eligible(found, one))])
+    ineligible = [f"not eligible: {reason}" for reason in _not_eligible(found, one)]
+    broken = [f"order broken: {how}" for how in enrolment.order_broken(one)]
+    yield "\n".join([*excluded, *ineligible, *broken])
 
 
 def _state(run: RunProgress) -> str:

@@ -28,6 +28,7 @@ from experiments.study.enrolment import (
     join,
     left_to_do,
     next_experiment,
+    order_broken,
     passed_over,
     read_back_refusal,
     readmit,
@@ -83,6 +84,22 @@ def test_an_experiment_breaks_the_order_if_an_earlier_one_is_not_done() -> None:
     assert passed_over(None, "preference", ORDER) == ["direction"]
     assert passed_over(someone("in progress", "not begun"), "preference", ORDER) == ["direction"]
     assert passed_over(someone("done", "not begun"), "preference", ORDER) == []
+
+
+def at(*ended: str) -> Participant:
+    """Somebody who is done with everything, each at its time."""
+    person = someone("done", "done")
+    return replace(person, runs=tuple(replace(run, last_utc=utc) for run, utc in zip(person.runs, ended, strict=True)))
+
+
+def test_runs_that_were_done_in_another_order_than_the_studys_are_named() -> None:
+    broken = ("preference was begun before direction was done",)
+    for first in ("not begun", "in progress", "synthetic"):
+        assert order_broken(someone(first, "done")) == order_broken(someone(first, "in progress")) == broken
+    assert order_broken(at("2026-11-28T10:00:00Z", "2026-11-28T09:00:00Z")) == broken
+    for kept in (someone("done", "open elsewhere"), someone("in progress", "synthetic"), someone("done", "not begun")):
+        assert order_broken(kept) == ()
+    assert order_broken(at("2026-11-28T10:00:00Z", "2026-11-28T11:00:00Z")) == ()
 
 
 # what may begin

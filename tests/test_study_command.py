@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from experiments.clock import VirtualClock
+from experiments.clock import Clock, VirtualClock
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
 from experiments.run import run
@@ -41,12 +41,13 @@ def pilot(tmp_path: Path) -> Path:
     return tmp_path / "pilot"
 
 
-def do(pilot: Path, code: str, experiment: str = "direction", results: Path | None = None) -> None:
+def do(
+    pilot: Path, code: str, experiment: str = "direction", results: Path | None = None, clock: Clock | None = None
+) -> None:
     """A run at a terminal, as a person does it; for speed it is typed by the screen of a synthetic participant."""
     setup, where = load_setup(str(pilot / f"{experiment}.toml")), results or pilot / "results"
-    run(
-        RunRequest(setup=setup, participant_id=code, results=where, screen="terminal"), synthetic_screen, VirtualClock()
-    )
+    request = RunRequest(setup=setup, participant_id=code, results=where, screen="terminal")
+    run(request, synthetic_screen, clock or VirtualClock())
 
 
 def told(recoil: Recoil, *more: object, folder: str = "pilot", code: int = 0) -> Any:
@@ -85,8 +86,9 @@ def test_a_new_study_has_nobody_and_its_first_code_comes_next(recoil: Recoil, pi
 
 def test_the_table_tells_who_is_done_in_progress_and_next(recoil: Recoil, pilot: Path) -> None:
     recoil("study", "pilot", "--join", "P01", *RIGHT)
+    clock = VirtualClock()
     for experiment in ("direction", "preference"):
-        do(pilot, "P01", experiment)
+        do(pilot, "P01", experiment, clock=clock)
     do(pilot, "P02")
     answered = cut(journal_of(pilot, "P02"), 40)
     assert answered
@@ -250,6 +252,12 @@ def test_a_damaged_register_is_listed_and_stops_changes_but_not_looking(recoil: 
     assert "P01" in done.stdout
     refused(recoil("study", "pilot", "--exclude", "P01", "--reason", "left"), "participants.jsonl: line 1", "restore")
     assert (pilot / "results" / "participants.jsonl").read_text() == "damage\n"
+
+
+def test_whose_experiments_were_not_in_the_order_of_the_study_is_told(recoil: Recoil, pilot: Path) -> None:
+    do(pilot, "P01", "preference")
+    assert "order broken:" in recoil("study", "pilot").stdout
+    assert told(recoil)["participants"][0]["order_broken"] == ["preference was begun before direction was done"]
 
 
 # joining, excluding, readmitting

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import get_args
 
@@ -56,6 +57,17 @@ def left_to_do(person: Participant | None, experiments: Sequence[str]) -> list[s
 def passed_over(person: Participant | None, experiment: str, experiments: Sequence[str]) -> list[str]:
     """The experiments that come before one in the study and that somebody has not done: doing it breaks the order."""
     return left_to_do(person, experiments[: experiments.index(experiment)])
+
+
+def order_broken(person: Participant) -> tuple[str, ...]:
+    """Which runs of somebody's began before one that comes earlier in the study was done."""
+    return tuple(
+        f"{then.experiment} was begun before {first.experiment} was done"
+        for first, then in combinations(person.runs, 2)
+        if then.state in ("done", "in progress", "open elsewhere")
+        and first.state != "unreadable"
+        and (first.state != "done" or "" < then.last_utc < first.last_utc)
+    )
 
 
 def facts_of(typed: Mapping[str, str]) -> Facts:
