@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from analysis.logs.design_logs import ONE_DESIGN
 from analysis.logs.exclusions import FINISHED, TRUSTED, LeftOut
 from analysis.logs.files import Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import RunFile
@@ -20,7 +21,8 @@ from experiments.study.study import Member
 
 CONTENTS = "contents.csv"
 Here = Literal["finished", "not finished"]
-EntryState = Here | Literal["excluded", "begun", "practice", "set aside", "kept out", "no journal", "broken", "no run"]
+Left = Literal["excluded", "begun", "practice", "set aside", "kept out", "no journal", "other design", "broken"]
+EntryState = Here | Left | Literal["no run"]
 """How a run stands; only the first two are in an archive."""
 MEANINGS: Mapping[EntryState, str] = {
     "finished": "in the archive",
@@ -31,6 +33,7 @@ MEANINGS: Mapping[EntryState, str] = {
     "set aside": "left out: an unfinished run that was set aside for a fresh one",
     "kept out": "left out: data of another kind (real, simulated gun, synthetic) than the archive's",
     "no journal": "left out: a table that no journal proves",
+    "other design": "left out: a sound run of another design than the one that is frozen, or that most runs have",
     "broken": "left out: table or journal breaks a rule, or was changed since the run",
     "no run": "the participant joined and has no run",
 }
@@ -102,6 +105,7 @@ _RULES: Mapping[EntryState, str] = {
     "excluded": IN_REGISTER,
     "begun": FINISHED,
     "no journal": TRUSTED,
+    "other design": ONE_DESIGN,
     "broken": TRUSTED,
 }
 """The states in which a run leaves somebody out, with the rule; practices, runs set aside and other kinds do not."""
@@ -140,6 +144,8 @@ def _of_run(run: RunFile, state: EntryState, excluded: Collection[str]) -> Entry
 
 
 def _why(problem: Problem) -> EntryState:
+    if f"(rule: {ONE_DESIGN})" in problem.message:
+        return "other design"
     return "kept out" if problem.message in _KEPT_OUT else "broken"
 
 

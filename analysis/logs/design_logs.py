@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fa
 from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name
 from analysis.logs.journals import Beside, journal_beside, journal_of
 from analysis.logs.names import gun_labels
+from device.messages import first_few
+from experiments.config.door import ConfigError, checked_table
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
@@ -23,6 +26,8 @@ from experiments.record.design_columns import columns
 from experiments.record.design_table import went_back
 from experiments.record.journal import Head, JournalError
 from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
+from experiments.study.changes import FileValues, changed_keys, plain_value
+from experiments.study.preregistration import read_chain
 from experiments.tasks.questions import correct_columns, is_right
 
 
@@ -70,7 +75,7 @@ def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
     return DesignLog(
         code=code,
         design=design,
-        key=_key(design),
+        key=design_key(design),
         rows=rows,
         journal=beside,
         gun_labels=gun_labels(head),
@@ -92,9 +97,45 @@ def _design_of(path: str) -> tuple[bytes, DesignConfig, Head]:
         raise BadLogError(str(error)) from error
 
 
-def _key(design: DesignConfig) -> str:
-    parts = {"factors", "order", "procedure", "trial", "questions", "table"}
-    return sha256(design.model_dump(mode="json", include=parts))
+_TOGETHER = ("design", "factors", "order", "procedure", "trial", "questions", "table")
+"""What logs share that can be analysed together."""
+ONE_DESIGN = "logs of one design are analysed together"
+"""The rule that leaves out a sound log of another design."""
+APART = "analyse it apart: name the logs of its design in a call of their own"
+_KEYS_TOLD = 5
+
+
+def design_key(design: DesignConfig) -> str:
+    """The same for designs whose logs can be analysed together."""
+    return sha256(_shared(design))
+
+
+def _shared(design: DesignConfig) -> FileValues:
+    return design.model_dump(mode="json", include=set(_TOGETHER))
+
+
+def frozen_designs(folders: Iterable[Path]) -> dict[str, str]:
+    """The keys of the designs that are frozen in these studies, as last amended, each with what freezes it."""
+    found = {}
+    for last in filter(None, (read_chain(folder).last for folder in folders)):
+        for file in last.designs:
+            with suppress(ConfigError):  # of a version that had other keys
+                frozen = checked_table(DesignConfig, dict(last.files[file]), file)
+                found[design_key(frozen)] = f"preregistration {last.number}"
+    return found
+
+
+def _another_design(design: DesignConfig, kept: DesignConfig, frozen: str | None) -> str:
+    """What is said of a log of another design than the one that is analysed: the keys that differ, and which it is."""
+    keys = [
+        f"{change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
+        for change in changed_keys(design.design, _shared(kept), _shared(design))
+    ]
+    than = "most logs of that name" if frozen is None else f"{frozen} freezes"
+    return (
+        f"was made with another design {design.design!r} than {than}: {first_few(keys, _KEYS_TOLD)} "
+        f"(rule: {ONE_DESIGN}); {APART}"
+    )
 
 
 def _rows(content: bytes, design: DesignConfig) -> Iterator[dict[str, object]]:
@@ -186,15 +227,20 @@ def _check_onsets(rows: Sequence[Mapping[str, object]]) -> None:
             raise BadLogError(too_early(onsets[place]), place + 2, "onset_utc")
 
 
-def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> tuple[list[DesignLogs], set[str]]:
-    """The logs by design, each with its study; and the keys of those that most logs of the name do not share.
+def logs_by_design(
+    logs: Sequence[tuple[DesignLog, str]], frozen: Mapping[str, str], *, several: bool
+) -> tuple[list[DesignLogs], dict[str, str]]:
+    """The logs by design, each with its study; and by their keys what is said of those of another design of the name.
 
-    With several studies a participant is `study/code`.
+    Of several designs of a name the `frozen` one is analysed, else that of most logs. With several studies a
+    participant is `study/code`.
     """
-    by_name: dict[str, Counter[str]] = {}
-    for log, _ in logs:
-        by_name.setdefault(log.design.design, Counter())[log.key] += 1
-    main = {name: keys.most_common(1)[0][0] for name, keys in by_name.items()}
+    designs = {log.key: log.design for log, _ in logs}
+    logs_of = Counter(log.key for log, _ in logs)
+    keys_of = dict[str, list[str]]()
+    for key, design in designs.items():
+        keys_of.setdefault(design.design, []).append(key)
+    main = {name: max(keys, key=lambda key: (key in frozen, logs_of[key])) for name, keys in keys_of.items()}
     found = []
     for key in main.values():
         some = [(log, study) for log, study in logs if log.key == key]
@@ -206,4 +252,5 @@ def logs_by_design(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> t
         names = [column.name for column in columns(some[0][0].design)]
         table = pd.DataFrame(rows, columns=["study", *names])
         found.append(DesignLogs(design=some[0][0].design, table=table, gun_labels=some[0][0].gun_labels))
-    return found, {log.key for log, _ in logs} - set(main.values())
+    others = [(key, design, main[design.design]) for key, design in designs.items() if key not in main.values()]
+    return found, {key: _another_design(design, designs[kept], frozen.get(kept)) for key, design, kept in others}

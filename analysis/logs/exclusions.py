@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.logs.design_logs import DesignLogs
+from analysis.logs.design_logs import APART, ONE_DESIGN, DesignLogs
 from analysis.logs.files import Problem, below, folder_above, name_below
 from analysis.logs.measures import MEASURES
 from analysis.logs.reading import Logs
@@ -191,14 +191,15 @@ _COMMAND = re.compile(r"`((?:recoil |--|include_)[^`]*)`")
 def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
     """A problem in the words of an exclusion: its rule and the command it names, if it does."""
     said = below(one, name.parent)
-    rule, command = _RULE.search(said), _COMMAND.search(said)
+    found, command = _RULE.search(said), _COMMAND.search(said)
+    rule = found[1] if found else TRUSTED
     correct = "correct it (DATA_DICTIONARY.md says what it may hold) and analyse again"
     return LeftOut(
         experiment=one.experiment,
         participant=logs.person(one.study, one.participant) if one.participant else "",
         reason=said,
-        rule=rule[1] if rule else TRUSTED,
-        remedy=f"`{command[1]}`" if command else correct,
+        rule=rule,
+        remedy=APART if rule == ONE_DESIGN else f"`{command[1]}`" if command else correct,
         file=name.as_posix(),
     )
 

@@ -17,7 +17,14 @@ import pandas as pd
 
 from analysis.logs.admission import LOGS_A_FILE, Batch, LogsSoFar, WaitingFile
 from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
-from analysis.logs.design_logs import DesignLog, DesignLogs, is_of_design, logs_by_design, read_design_log
+from analysis.logs.design_logs import (
+    DesignLog,
+    DesignLogs,
+    frozen_designs,
+    is_of_design,
+    logs_by_design,
+    read_design_log,
+)
 from analysis.logs.doubles import told_by_design
 from analysis.logs.doubtful_times import doubt_of_design
 from analysis.logs.files import (
@@ -242,19 +249,22 @@ def _designed(
 
 
 def _by_design(reading: LogsSoFar, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
-    """The logs by design; one that was made with another design than most of its name is left out."""
+    """The logs by design; one that was made with another design than the one that is analysed is left out."""
     several = len(set(studies.values())) > 1
-    found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], several=several)
+    frozen = frozen_designs(_study_folders(reading.paths[number // LOGS_A_FILE] for number in logs))
+    found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], frozen, several=several)
     for number, log in logs.items():
         if log.key in others:
             path = reading.paths.pop(number // LOGS_A_FILE)
-            message = (
-                f"was made with another design {log.design.design!r} than most logs of that name (its factors, order, "
-                "procedure, trial or questions differ); analyse it apart"
-            )
             study = reading.studies[number]
-            reading.problems.append(BadLogError(message).of(Path(path), log.code, log.design.design, study))
+            reading.problems.append(BadLogError(others[log.key]).of(Path(path), log.code, log.design.design, study))
     return tuple(found)
+
+
+def _study_folders(paths: Iterable[str]) -> list[Path]:
+    """The folders of the studies that logs belong to."""
+    results = dict.fromkeys(Path(results_above(os.path.abspath(path))) for path in paths)  # noqa: PTH100 - no link read
+    return [study_folder(one, one) for one in results]
 
 
 def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[WaitingFile]]:

@@ -130,7 +130,7 @@ class _Looked:
     """One study as it was found: its register, its runs in the order in which they began, and how it stands.
 
     `blank`: runs that were killed before anything was acknowledged; `unread`: those whose journal cannot be read.
-    `strangers`: of which experiment who else has a run, as synthetic participants beside people. `elsewhere`: runs that
+    `strangers`: the journals of whoever else has runs, as synthetic participants beside people. `elsewhere`: runs that
     lie in the study's results and were not given to the analysis; `unread_elsewhere` as `unread`.
     """
 
@@ -141,7 +141,7 @@ class _Looked:
     runs: tuple[_Run, ...]
     blank: tuple[RunFile, ...]
     unread: tuple[RunFile, ...]
-    strangers: frozenset[tuple[str, str]]
+    strangers: frozenset[str]
     elsewhere: tuple[_Run, ...]
     unread_elsewhere: tuple[RunFile, ...]
 
@@ -169,7 +169,7 @@ class _Looked:
             runs=tuple(sorted(mine, key=lambda one: one.head.utc)),
             blank=tuple(run for run, one in read if one == "blank"),
             unread=tuple(run for run, one in read if one == "unread"),
-            strangers=frozenset((one.code, one.file.experiment) for one in began if one not in mine),
+            strangers=frozenset(_place(one.file.path) for one in began if one not in mine),
             elsewhere=tuple(one for _, one in others if isinstance(one, _Run) and one.head.participant == whose),
             unread_elsewhere=tuple(run for run, one in others if one == "unread"),
         )
@@ -386,8 +386,8 @@ def _exclusions(looked: _Looked) -> Iterator[Deviation]:
             what = f"an unfinished run of {run.file.experiment} was set aside"
             yield Deviation(kind="exclusion", what=what, who=(run.code,))
     for problem in looked.logs.problems:
-        person = problem.participant, problem.experiment
-        mine = problem.study == str(looked.results) and all(person) and person not in looked.strangers
+        person, place = (problem.participant, problem.experiment), _place(journal_of(str(problem.file)))
+        mine = problem.study == str(looked.results) and all(person) and place not in looked.strangers
         if mine and problem.participant not in looked.excluded:
             why = problem.message.partition(";")[0].replace(f"{problem.file.parent}{os.sep}", "")
             yield Deviation(kind="exclusion", what=f"log of {problem.experiment} not used: {why}", who=person[:1])

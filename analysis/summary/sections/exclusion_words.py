@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
+from analysis.logs.design_logs import ONE_DESIGN
 from analysis.logs.exclusion_rules import BY_HAND
 from analysis.logs.exclusions import FINISHED, NOT_COUNTED, LeftOut
 from analysis.logs.kinds import IN_REGISTER, NEVER_TOGETHER
@@ -21,6 +22,7 @@ _WORDS = {
     "every method is rated": "for a missing rating",
     "everybody has every method": "for lack of a method",
     NOT_COUNTED[0]: "for lack of forward trials",
+    ONE_DESIGN: "for a run of another design",
     "min_kept_share": "for too few trials kept{}",
     "max_same_response_share": "for giving the same answer too often{}",
     "accuracy": "for too few right answers{}",

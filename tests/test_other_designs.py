@@ -1,0 +1,123 @@
+"""A study whose design was changed between its runs: which is analysed, who is left out, why, and where that stands."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from analysis.archive.archive_export import ArchiveRequest, export_archive
+from analysis.archive.contents import left_out_in
+from analysis.archive.preregistration import freeze
+from analysis.logs.design_logs import APART, ONE_DESIGN
+from analysis.logs.exclusions import left_out_by_files
+from analysis.logs.reading import read_logs
+from analysis.summary.deviations import AnalysisFiles, deviations
+from experiments.clock import RealClock, VirtualClock
+from experiments.load import load_setup
+from experiments.run import run
+from experiments.run_request import RunRequest
+from experiments.screens.synthetic import synthetic_screen
+from experiments.study.new_study import new_study
+
+pytestmark = pytest.mark.slow
+
+SHORT, LONG = "[0.004, 0.018]", "[0.006, 0.018]"
+
+
+def do(study: Path, *codes: str, person: bool = True) -> None:
+    """Runs as people do them, or synthetic participants."""
+    for code in codes:
+        request = RunRequest(
+            setup=load_setup(study / "magnitude.toml"),
+            participant_id=code,
+            results=study / "results",
+            seed=int(code[1:]),
+            screen="terminal" if person else "synthetic",
+        )
+        run(request, synthetic_screen, VirtualClock())
+
+
+def set_aside(study: Path, code: str) -> None:
+    """As a synthetic run gives way to a person."""
+    folder = study / "results" / f"sub-{code}"
+    for path in [*folder.glob("*_journal.jsonl"), *folder.glob("*_trials.csv")]:
+        path.rename(path.with_name(f"{path.stem}.aside-1{path.suffix}"))
+
+
+def with_levels(study: Path, levels: str) -> None:
+    path = study / "magnitude.toml"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(f"levels = {levels}\n" if line.startswith("levels = [0.") else line for line in lines))
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """A study of one short design."""
+    new_study(tmp_path / "study", "magnitude")
+    path = tmp_path / "study" / "magnitude.toml"
+    path.write_text(path.read_text().replace("sets = 3", "sets = 1").replace("repetitions = 3", "repetitions = 1"))
+    with_levels(path.parent, SHORT)
+    return path.parent
+
+
+def test_without_a_freeze_the_design_of_most_logs_is_analysed_and_the_keys_that_differ_are_named(study: Path) -> None:
+    do(study, "P01", "P02")
+    with_levels(study, LONG)
+    do(study, "P03")
+    logs = read_logs([study / "results"])
+    assert sorted(logs.designs[0].table["participant_id"].unique()) == ["P01", "P02"]
+    (one,) = left_out_by_files(logs)
+    assert (one.participant, one.rule, one.remedy) == ("P03", ONE_DESIGN, APART)
+    said = f"another design 'magnitude' than most logs of that name: factors.pulse_s.levels = {LONG}, not {SHORT} (rule"
+    assert said in one.reason
+
+
+def test_the_frozen_design_is_analysed_though_most_logs_have_the_one_that_was_amended(study: Path) -> None:
+    freeze(study, "", RealClock())
+    do(study, "P01", "P02")
+    with_levels(study, LONG)
+    freeze(study, "too weak", RealClock())
+    do(study, "P03")
+    logs = read_logs([study / "results"])
+    assert logs.designs[0].table["participant_id"].unique().tolist() == ["P03"]
+    assert [one.participant for one in left_out_by_files(logs)] == ["P01", "P02"]
+    said = f"than preregistration 2 freezes: factors.pulse_s.levels = {SHORT}, not {LONG} (rule: {ONE_DESIGN})"
+    assert all(said in one.message for one in logs.problems)
+
+
+def test_who_is_left_out_stands_among_the_deviations_though_a_synthetic_run_was_set_aside_for_them(study: Path) -> None:
+    freeze(study, "", RealClock())
+    do(study, "P01", person=False)
+    set_aside(study, "P01")
+    do(study, "P01")
+    with_levels(study, LONG)
+    freeze(study, "too weak", RealClock())
+    do(study, "P03")
+    ((found,), _) = deviations(read_logs([study / "results"]), AnalysisFiles())
+    unused = [one for one in found.deviations if one.kind == "exclusion" and "not used" in one.what]
+    assert [one.who for one in unused] == [("P01",)]
+    assert "levels = [0.004, 0.018], not [0.006, 0.018]" in unused[0].what
+
+
+def test_an_archive_calls_the_run_one_of_another_design_and_not_a_broken_one(study: Path, tmp_path: Path) -> None:
+    do(study, "P01", "P02", person=False)
+    with_levels(study, LONG)
+    do(study, "P03", person=False)
+    export_archive(ArchiveRequest(folder=study, out=tmp_path / "archive", include_synthetic=True))
+    rows = csv.DictReader((tmp_path / "archive" / "contents.csv").read_text().splitlines())
+    assert {row["participant_id"]: row["state"] for row in rows} == {
+        "P01": "finished", "P02": "finished", "P03": "other design"
+    }  # fmt: skip
+    (one,) = left_out_in(tmp_path / "archive")
+    assert (one.participant, one.rule, one.file) == ("P03", ONE_DESIGN, "")
+
+
+def test_designs_of_two_names_that_are_alike_otherwise_stay_apart(study: Path) -> None:
+    do(study, "P01")
+    path = study / "magnitude.toml"
+    path.write_text(path.read_text().replace('design = "magnitude"', 'design = "again"'))
+    do(study, "P01", "P02")
+    found = {one.design.design: one.table["participant_id"].nunique() for one in read_logs([study / "results"]).designs}
+    assert found == {"magnitude": 1, "again": 2}
