@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,16 +15,34 @@ from analysis.logs.design_logs import APART, ONE_DESIGN
 from analysis.logs.exclusions import left_out_by_files
 from analysis.logs.reading import read_logs
 from analysis.summary.deviations import AnalysisFiles, deviations
-from experiments.clock import RealClock, VirtualClock
+from experiments.clock import Clock, RealClock, VirtualClock
+from experiments.config.setup import Setup
+from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan
 from experiments.load import load_setup
 from experiments.run import run
 from experiments.run_request import RunRequest
-from experiments.screens.synthetic import synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
+from experiments.session.events import Event, Rating
+from experiments.session.states import Position
 from experiments.study.new_study import new_study
+from experiments.synthetic.answers import synthetic_participant_of
 
 pytestmark = pytest.mark.slow
 
 SHORT, LONG = "[0.004, 0.018]", "[0.006, 0.018]"
+
+
+class PersonScreen(SyntheticScreen):
+    """Answers as an experimenter types them."""
+
+    def _event(self, position: Position, until_s: float | None) -> Event | None:
+        event = super()._event(position, until_s)
+        return replace(event, by="experimenter") if isinstance(event, Rating) else event
+
+
+def person_screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> PersonScreen:
+    return PersonScreen(setup.config, synthetic_participant_of(setup, plan), clock)
 
 
 def do(study: Path, *codes: str, person: bool = True) -> None:
@@ -36,7 +55,7 @@ def do(study: Path, *codes: str, person: bool = True) -> None:
             seed=int(code[1:]),
             screen="terminal" if person else "synthetic",
         )
-        run(request, synthetic_screen, VirtualClock())
+        run(request, person_screen if person else synthetic_screen, VirtualClock())
 
 
 def set_aside(study: Path, code: str) -> None:
