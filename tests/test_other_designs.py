@@ -15,6 +15,7 @@ from analysis.logs.design_logs import APART, ONE_DESIGN
 from analysis.logs.exclusions import left_out_by_files
 from analysis.logs.reading import read_logs
 from analysis.summary.deviations import AnalysisFiles, deviations
+from analysis.summary.participation import participation
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -140,3 +141,22 @@ def test_designs_of_two_names_that_are_alike_otherwise_stay_apart(study: Path) -
     do(study, "P01", "P02")
     found = {one.design.design: one.table["participant_id"].nunique() for one in read_logs([study / "results"]).designs}
     assert found == {"magnitude": 1, "again": 2}
+
+
+def test_a_synthetic_run_that_gave_way_is_none_of_the_peoples_that_were_set_aside(study: Path, tmp_path: Path) -> None:
+    do(study, "P01", person=False)
+    set_aside(study, "P01")
+    do(study, "P01")
+    do(study, "P02", person=False)
+    logs = read_logs([study / "results"])
+    assert logs.kind == "simulated gun"
+    assert participation(logs, {"magnitude": ["P01"]}, ()).experiments["magnitude"].set_aside == 0
+    export_archive(ArchiveRequest(folder=study, out=tmp_path / "archive"))
+    rows = csv.DictReader((tmp_path / "archive" / "contents.csv").read_text().splitlines())
+    assert [(row["participant_id"], row["state"], row["data"]) for row in rows] == [
+        ("P01", "finished", "simulated gun"),
+        ("P01", "set aside", "synthetic"),
+        ("P02", "kept out", "synthetic"),
+    ]
+    (apart,) = read_logs([study / "results"], include_synthetic=True).apart
+    assert [(run.participant, run.kind) for run in apart.runs] == [("P01", "set aside"), ("P02", "run")]

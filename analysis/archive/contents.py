@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -59,7 +59,9 @@ CONTENT_COLUMNS: tuple[Column, ...] = (
     tables.text_column("experiment", "which experiment; empty where there is no run"),
     tables.flag_column("in_archive", "1 if the run is in the archive, 0 if it is left out"),
     tables.level_column("state", tuple(MEANINGS), "how the run stands, or why it is left out", required=True),
-    tables.level_column("data", ("real", "simulated gun", "synthetic"), "whose data they are; empty if left out"),
+    tables.level_column(
+        "data", ("real", "simulated gun", "synthetic"), "whose data they are; empty where nothing says so"
+    ),
 )
 
 
@@ -88,12 +90,13 @@ def left_out_entries(
         if run.kind != "run":
             yield _of_run(run, run.kind, excluded)
     for begun in logs.begun:
-        yield _of_run(begun.file, "begun", excluded)
+        yield _of_run(replace(begun.file, data=begun.data), "begun", excluded)
     for problem in (*logs.problems, *without_journal):
         state: EntryState = "no journal" if problem in without_journal else _why(problem)
         code = problem.participant or code_in_name(str(problem.file)) or ""
         experiment = problem.experiment or experiment_in_name(str(problem.file))
-        yield Entry(participant_id=code, experiment=experiment, state="excluded" if code in excluded else state)
+        state = "excluded" if code in excluded else state
+        yield Entry(participant_id=code, experiment=experiment, state=state, kind=_KEPT_OUT.get(problem.message))
     files = {code_in_name(str(file)) for part in (logs, *logs.apart) for file in part.files}
     seen = {run.participant for run in runs} | files | {problem.participant for problem in logs.problems}
     for code in members:
@@ -140,7 +143,7 @@ def _as_left_out(row: Mapping[str, str], state: EntryState) -> LeftOut:
 
 def _of_run(run: RunFile, state: EntryState, excluded: Collection[str]) -> Entry:
     why = "excluded" if run.participant in excluded else state
-    return Entry(participant_id=run.participant, experiment=run.experiment, state=why)
+    return Entry(participant_id=run.participant, experiment=run.experiment, state=why, kind=run.data)
 
 
 def _why(problem: Problem) -> EntryState:
@@ -149,4 +152,7 @@ def _why(problem: Problem) -> EntryState:
     return "kept out" if problem.message in _KEPT_OUT else "broken"
 
 
-_KEPT_OUT = frozenset(kept_out(kind, first) for kind in get_args(DataKind) for first in get_args(DataKind))
+_KEPT_OUT: Mapping[str, DataKind] = {
+    kept_out(kind, first): kind for kind in get_args(DataKind) for first in get_args(DataKind)
+}
+"""What is said of logs of another kind than the first, with theirs."""

@@ -20,7 +20,7 @@ from analysis.logs.files import (
     results_above,
     seen_from,
 )
-from analysis.logs.journals import Beside, RunFile, begins_with, journal_of
+from analysis.logs.journals import Beside, RunFile, begins_with, journal_of, with_data
 from analysis.logs.kinds import IN_REGISTER, kept_out, kinds_of
 from analysis.logs.rules import Log
 from analysis.logs.setups import SetupOfLog, changed_setups
@@ -295,17 +295,19 @@ class LogsSoFar:
     def runs_by_kind(self, runs: Iterable[RunFile], first: DataKind) -> Mapping[DataKind, list[RunFile]]:
         """The runs that journals tell of, by the kind of data that they gave; without any, they are of the first.
 
-        The runs of logs that are copies are those of the logs that stay.
+        Practices and runs that were set aside are with logs of their own kind, if there are any. The runs of logs that
+        are copies are those of the logs that stay.
         """
         kinds = {
             (study, self.codes[number], self.experiments[number]): self.kinds[number] or first
             for number, study in self.studies.items()
         }
+        there = set(kinds.values())
         found: dict[DataKind, list[RunFile]] = {kind: [] for kind in get_args(DataKind)}
-        for run in runs:
+        for run in map(with_data, runs):
             key = run.study, run.participant, run.experiment
             if key not in self.copied:
-                found[kinds.get(key, first)].append(run)
+                found[run.data if run.data in there else kinds.get(key, first)].append(run)
         return found
 
     def _go_together(self, one: int, other: int) -> bool:

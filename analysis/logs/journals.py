@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -28,13 +28,17 @@ _SUFFIXES = tuple(f"_{suffix}" for suffix in FILE_SUFFIX.values())
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFile:
-    """A run by the name of its journal: whose, of which experiment, in which folder."""
+    """A run by the name of its journal: whose, of which experiment, in which folder.
+
+    `data`: of a practice and of a run that was set aside whose data it has, where its journal says so.
+    """
 
     path: str
     participant: str
     experiment: str
     kind: RunKind
     study: str
+    data: DataKind | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +74,14 @@ def run_file(path: str, study: str) -> RunFile | None:
         return None
     kind: RunKind = "practice" if found[3] else "set aside" if found[4] else "run"
     return RunFile(path=path, participant=found[1], experiment=found[2], kind=kind, study=study)
+
+
+def with_data(run: RunFile) -> RunFile:
+    """A practice or a run that was set aside with whose data it has; of other runs their logs say it."""
+    with suppress(JournalError, OSError):
+        head = None if run.kind == "run" else journal.head_of(Path(run.path), storage.first_line(run.path))
+        return run if head is None else replace(run, data=data_of(head))
+    return run
 
 
 def journal_of(path: str) -> str:

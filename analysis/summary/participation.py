@@ -18,7 +18,7 @@ class PeopleOfExperiment:
     """How many people are in the analysis of an experiment, and how many are not, by the reason.
 
     `begun`: not finished; `not_done`: known from elsewhere in a study that has the experiment. `practices` and
-    `set_aside` count runs, which are not data.
+    `set_aside` count runs, which are not data; those of another kind, as of synthetic participants, are not counted.
     """
 
     analysed: int
@@ -80,7 +80,7 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
         for name in names
         if (said := state(who, name))
     )
-    kinds = Counter[tuple[str, str]]((run.experiment, run.kind) for _, run in runs)
+    kinds = Counter[tuple[str, str]]((run.experiment, run.kind) for _, run in runs if run.data in (None, logs.kind))
     counts = Counter((one.experiment, one.state.partition(":")[0]) for one in absent)
     return Participation(
         experiments={name: _counted(name, len(within.get(name, ())), counts, kinds) for name in names},
