@@ -31,6 +31,8 @@ ANSWER = (
     "session", "method", "set", "trial", "direction", "instruction", "response", "correct", "response_time_s",
     "response_source", "response_time_valid",
 )  # fmt: skip
+STAMP_S = 0.001
+"""Window systems stamp keys in whole milliseconds."""
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +83,7 @@ def test_data_mode_and_the_console_give_the_same_answers_in_the_same_times(
         for _, word in history(read_journal(tmp_path / "seen" / f"{STEM}_journal.jsonl"))
         if isinstance(word, Answered)
     ]
-    assert all(word.key_time_s is not None and word.key_time_s >= word.response_time_s for word in given)
+    assert all(word.key_time_s is not None and word.key_time_s >= word.response_time_s - STAMP_S for word in given)
 
 
 def test_numbers_that_make_nobody_end_the_console_with_one_message(

@@ -444,14 +444,12 @@ class Controls:
     def help_lines(self) -> list[str]:
         """Every key, what it does, and why it does nothing now."""
         unused = keys.ANSWERS[len(self.choices) :]
-        return [self._help_line(command.name) for command in keys.KEY_COMMANDS if command.name not in unused]
+        return [self._help_line(one.name) for one in keys.KEY_COMMANDS if one.name not in unused]
 
     def _help_line(self, name: keys.Name) -> str:
-        not_now = self.idle(name)
-        choices = self.choices if name in keys.ANSWERS else keys.choices_at(self.drawn)
+        not_now, choices = self.idle(name), self.choices if name in keys.ANSWERS else keys.choices_at(self.drawn)
         key = keys.shown_key(name, letters=self.typing.letters, choices=choices)
         does = keys.BY_NAME[name].does
         if name in keys.ANSWERS:
             does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].told)
-        not_done = phrase("   – not now: {because}", because=not_now) if not_now else ""
-        return f"{key:<8} {does}{not_done}"
+        return f"{key:<8} {does}" + (phrase("   – not now: {because}", because=not_now) if not_now else "")
