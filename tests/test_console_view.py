@@ -663,7 +663,7 @@ def test_what_comes_next_in_a_set_with_questions_after_it_ends_with_the_set(seve
     break_s = "break of 20 s"
     assert progress.coming(seen(several, Position(step=ask(second)))) == ["words", break_s, shown_way(third)]
     said = progress.coming(seen(several, Position(step=words)), count=4)
-    assert said[:3] == ["“words”: Feedback 2 of 2", break_s, shown_way(third)]
+    assert said[:3] == ["“words”: Trial 2 of 2", break_s, shown_way(third)]
     said = progress.coming(seen(several, Position(step=replace(words, trial=second))))
     assert said[:2] == [break_s, shown_way(third)]
     last = replace(words, trial=plan_of(several).trials[-1])

@@ -191,7 +191,7 @@ def test_a_message_that_a_page_does_not_use_is_in_no_catalogue():
 def test_a_labs_own_folder_has_a_language_with_every_message(folder, code):
     found = language(code, folder)
     assert found.messages.wait == SAID[code]("Please wait.")
-    assert found.messages.place.format(number=2, of=3) == SAID[code]("Feedback {number} of {of}").format(number=2, of=3)
+    assert found.messages.place.format(number=2, of=3) == SAID[code]("Trial {number} of {of}").format(number=2, of=3)
     assert found.right_to_left == (code == RIGHT_TO_LEFT)
     assert found.checked_by
 
@@ -651,7 +651,7 @@ def test_at_a_terminal_what_is_read_out_is_in_the_language_and_what_is_saved_in_
     text = screen.text(Position(states=(State.RATING,), step=step))
     assert long.messages.place.format(number=2, of=3) in text
     assert step.text in text
-    assert texts.about_text(plan, step) == "Feedback 2 of 3"
+    assert texts.about_text(plan, step) == "Trial 2 of 3"
 
 
 def test_the_languages_to_choose_from_are_the_checked_ones_unless_it_is_said_otherwise(folder):

@@ -177,7 +177,7 @@ def test_a_bare_command_where_words_are_typed_is_asked_about_before_it_is_stored
         screen.type("undo")
         screen.wait_for(asked)
         screen.type("like a toy")
-        screen.wait_for("Saved. Feedback 1 of 3: “comment”.")
+        screen.wait_for("Saved. Trial 1 of 3: “comment”.")
         screen.wait_for("for no answer:", 2)
         screen.type("undo")
         screen.wait_for("Correct the “comment” of")

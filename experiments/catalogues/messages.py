@@ -26,9 +26,7 @@ class ParticipantMessages:
     paused: str = _said("Paused. Please wait.", "alone on the screen")
     between: str = _said("Thank you. Please wait.", "alone on the screen, between two questions")
     thanks: str = _said("Thank you.", "alone on the screen, at the very end")
-    place: str = _said(
-        "Feedback {number} of {of}", "heads a question: the haptic feedback, by its order; also read out"
-    )
+    place: str = _said("Trial {number} of {of}", "heads a question: the trial, by its order; also read out")
     numbered: str = _said("{number}. {question}", "a question that comes later, behind the number of its trial")
     confirm: str = _said("Confirm", "a button, short")
     done: str = _said("Done", "a button, short")

@@ -128,8 +128,11 @@ class StartWindow(QtWidgets.QWidget):
         fields = [(one.experiments, one.config.experiments, one.config.eligibility.ask) for one in (before, now)]
         if fields[0] != fields[1]:
             raise PlaceError(
-                f"{before.source}: the experiments, or what participants are asked, are not those that this window "
-                "opened with: quit, and start it again"
+                phrase(
+                    "{source}: the experiments, or what participants are asked, are not those that this window opened "
+                    "with: quit, and start it again",
+                    source=before.source,
+                )
             )
         self._study = now
 
