@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from analysis.logs.exclusion_rules import Rules, TrialRules
 from analysis.summary.announced import sentences_of_tests
+from analysis.summary.planned_files import bounds_told
 from analysis.summary.requests import AnyRequest
 from experiments.config.door import EligibilityConfig, StudyConfig
 from experiments.config.setup import Setup
@@ -151,6 +152,7 @@ def _tests(planned: Planned) -> Iterator[str]:
         [
             *(sentence for setup in planned.setups for sentence in sentences_of_tests(setup.config)),
             *(f"{one.of}, {_request(one)}." for one in planned.requests),
+            *(f"{one}." for one in bounds_told(planned.requests, [setup.config for setup in planned.setups])),
             *(["direction: the diffusion model is fitted to the response times."] if own.fits else []),
             *([f"Free descriptions are coded by {own.codebook}."] if own.codebook else []),
         ]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from analysis.predict.check_design import AS_FROZEN, DesignCheck, check_design, design_sections
 from analysis.report.section import Section
-from analysis.report.serial import plain
+from analysis.report.serial import UNWRITTEN, plain
 from analysis.report.terminal import in_text, with_tables
 from device.messages import how_many
 from experiments.config.door import ConfigError, EligibilityConfig, at_key, participant_codes, read_toml
@@ -25,12 +25,13 @@ EXAMPLE_SEED = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyCheck:
-    """What the config of a study means."""
+    """What the config of a study means; `bounds`: in which units those of its equivalence tests are."""
 
     study: str
     participants: int
     eligibility: EligibilityConfig
     experiments: tuple[DesignCheck, ...]
+    bounds: tuple[str, ...] = field(default=(), metadata=UNWRITTEN)
     frozen: FreezeStatus | None = field(default=None, metadata=AS_FROZEN)
 
 
@@ -98,16 +99,18 @@ def _study(name: str, seed: int | None) -> StudyCheck:
     if study.paper is not None:
         _check_paper(find(name), folder / study.paper)
     setups = [load_setup(folder / experiment) for experiment in study.experiments]
-    own = study.preregistration
+    own, bounds = study.preregistration, tuple[str, ...]()
     if any(one is not None for one in (own.rules, own.requests, own.codebook)):
-        from analysis.summary.planned_files import planned_files  # noqa: PLC0415 - most studies name no such files
+        from analysis.summary.planned_files import bounds_told, planned_files  # noqa: PLC0415 - most studies name no such files
 
-        planned_files(find(name), study, [setup.config for setup in setups])
+        designs = [setup.config for setup in setups]
+        bounds = tuple(bounds_told(planned_files(find(name), study, designs).requests, designs))
     return StudyCheck(
         study=study.title,
         participants=study.participants,
         eligibility=study.eligibility,
         experiments=tuple(_design(setup, seed, study.codes()) for setup in setups),
+        bounds=bounds,
     )
 
 
@@ -144,7 +147,9 @@ def sections(found: DesignCheck | StudyCheck) -> tuple[Section, ...]:
     asked = found.eligibility.model_dump(mode="json", exclude_none=True)
     rules = "; ".join(f"{key} {_listed(value)}" for key, value in asked.items() if value)
     title = f"Study: {found.study}, {how_many(found.participants, 'participant')}; eligibility: {rules or 'everyone'}"
-    return Section(title=title), *(section for one in found.experiments for section in sections(one))
+    return Section(title=title, items=found.bounds), *(
+        section for one in found.experiments for section in sections(one)
+    )
 
 
 def _listed(value: object) -> str:

@@ -9,8 +9,8 @@ from pathlib import Path
 from analysis.logs.exclusion_rules import Rules, methods_with_right_answers, without_trials_of
 from analysis.paper.paper import load_paper
 from analysis.summary.remarks_coding import load_codebook
-from analysis.summary.request_data import planned_names
-from analysis.summary.requests import AnyRequest, Requests, check_names
+from analysis.summary.request_data import planned_names, unit_of_bounds
+from analysis.summary.requests import LOGARITHMS, AnyRequest, EquivalenceRequest, Requests, check_names, ratios
 from experiments.config.door import ConfigError, StudyConfig, at_key, load
 from experiments.design.config import DesignConfig
 
@@ -39,6 +39,17 @@ def planned_files(source: Path, study: StudyConfig, designs: Sequence[DesignConf
     if faults:
         raise ConfigError("\n".join(faults))
     return PlannedFiles(rules=rules, requests=requests)
+
+
+def bounds_told(requests: Sequence[AnyRequest], designs: Sequence[DesignConfig]) -> Iterator[str]:
+    """In what unit the bounds of each equivalence test are, which a file of requests does not say."""
+    known = {design.design: design for design in designs}
+    for one in requests:
+        if isinstance(one, EquivalenceRequest):
+            unit = unit_of_bounds(known[one.of], one.question)
+            of = one.of if one.question is None else f"{one.of}, {one.question}"
+            more = f": {ratios(one)}" if unit == LOGARITHMS else ""
+            yield f"{of}: low = {one.low:g} and high = {one.high:g} of the equivalence test are in {unit}{more}"
 
 
 def _file(source: Path, key: str, name: str) -> Path:

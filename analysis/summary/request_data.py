@@ -17,7 +17,16 @@ from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
 from analysis.summary.designs import question_scores, varied
-from analysis.summary.requests import AnyRequest, RequestData, Requested, RequestNames, Requests, answer_to
+from analysis.summary.requests import (
+    LOGARITHMS,
+    AnyRequest,
+    RequestData,
+    Requested,
+    RequestNames,
+    Requests,
+    answer_to,
+    bounds_in,
+)
 from analysis.summary.summary import methods_in
 from experiments.config.door import ConfigError, at_key
 from experiments.design.config import DesignConfig
@@ -66,6 +75,14 @@ def planned_names(design: DesignConfig, asked: str | None) -> RequestNames:
     within = [design.factors[name].all_levels for name in varied(design) if name not in design.between]
     conditions = tuple(_conditions(product(*within))) if within else ("score",)
     return RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between))
+
+
+def unit_of_bounds(design: DesignConfig, asked: str | None) -> str:
+    """In what the bounds of an equivalence test of a design's scores are."""
+    if design.design in MEASURES:
+        return bounds_in(MEASURES[design.design].unit, shares=MEASURES[design.design].scale == (0.0, 1.0))
+    question = design.questions[_question(design, asked)]
+    return bounds_in(_unit(question), shares=question.kind in _SHARES)
 
 
 def _refuse_question(name: str, asked: str | None) -> None:
@@ -120,9 +137,13 @@ def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> 
         scores=found.people.set_axis([*conditions], axis=1),
         trials=found.real,
         unit=_unit(design.questions[name]),
-        shares=design.questions[name].kind in {"choice", "yes-no"},
+        shares=design.questions[name].kind in _SHARES,
         names=RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between)),
     )
+
+
+_SHARES = frozenset({"choice", "yes-no"})
+"""Questions whose scores are shares of answers."""
 
 
 def _unit(question: QuestionConfig) -> str:
@@ -130,7 +151,7 @@ def _unit(question: QuestionConfig) -> str:
     if question.kind in {"rating", "ranking"}:
         return f"{question.kind}s"
     if question.kind == "number":
-        return "natural logarithms of the numbers"
+        return LOGARITHMS
     return "right answers" if question.correct is not None else f"answers {question.named_answers[0]}"
 
 

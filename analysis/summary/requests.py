@@ -12,6 +12,7 @@ direction the share of right answers to forward shots. A condition of several fa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -136,6 +137,33 @@ class RequestData:
     names: RequestNames
 
 
+LOGARITHMS = "natural logarithms of the numbers"
+"""What scores of numbers are."""
+
+
+def bounds_in(unit: str, *, shares: bool) -> str:
+    """What the bounds of an equivalence test are of, by what a score is."""
+    return f"shares of {unit}, 0 to 1" if shares else unit
+
+
+def ratios(request: EquivalenceRequest) -> str:
+    """What bounds in natural logarithms are as ratios: between two conditions, or of the mean itself."""
+    what = "the geometric mean" if request.b is None else f"the ratio of {request.a} to {request.b}"
+    return f"{what} between {_factor(request.low)} and {_factor(request.high)}"
+
+
+def _factor(bound: float) -> str:
+    """The factor that a natural logarithm stands for.
+
+    >>> _factor(0.0), _factor(-5.0), _factor(1e6)
+    ('1', '0.00674', 'e^1e+06')
+    """
+    return f"{math.exp(bound):.3g}" if abs(bound) < _MOST_LOG else f"e^{bound:g}"
+
+
+_MOST_LOG = 50.0
+
+
 def check_names(request: AnyRequest, names: RequestNames) -> None:
     """`ValueError` if a request names what is not there, or asks what such a design cannot answer."""
     match request:
@@ -209,6 +237,7 @@ def _equivalence(request: EquivalenceRequest, data: RequestData) -> tuple[str, A
     what = request.a if request.b is None else f"{request.a} − {request.b}"
     scale, unit = (100.0, " percentage points") if data.shares else (1.0, "")
     shown = " and ".join(f"{scale * bound:g}".replace("-", "−") for bound in bounds[:2])
+    unit = f" in {data.unit} ({ratios(request)})" if data.unit == LOGARITHMS else unit
     note = (
         f"Whether the mean of {what} lies between {shown}{unit}, by two one-sided t-tests (TOST, Schuirmann 1987), "
         f"α = {request.alpha:g}: one test that it is above the lower bound, one that it is below the upper. p is the "
