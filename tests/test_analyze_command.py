@@ -10,6 +10,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -180,8 +181,12 @@ def test_an_interrupt_among_the_logs_ends_with_130_and_leaves_nothing(tmp_path: 
     words = [sys.executable, "-c", ON_A_DISK_THAT_HANGS, "analyze", tmp_path, "--out", tmp_path / "out"]
     with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
         wait_for((tmp_path / "is read").exists)
-        running.send_signal(signal.SIGINT)
-        assert running.wait(PATIENCE_S) == 130
+        for _ in range(10):  # Linux may give it to a thread that just begins, and the first one sleeps on
+            running.send_signal(signal.SIGINT)
+            with suppress(subprocess.TimeoutExpired):
+                running.wait(PATIENCE_S / 10)
+                break
+        assert running.returncode == 130
     assert not (tmp_path / "out").exists()
 
 

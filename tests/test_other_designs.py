@@ -20,12 +20,12 @@ from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
+from experiments.live_run import EventVerdict, LiveRun
 from experiments.load import load_setup
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
-from experiments.session.events import Event, Rating
-from experiments.session.states import Position
+from experiments.session.events import Event, Press, Rating
 from experiments.study.new_study import new_study
 from experiments.synthetic.answers import synthetic_participant_of
 
@@ -34,12 +34,21 @@ pytestmark = pytest.mark.slow
 SHORT, LONG = "[0.004, 0.018]", "[0.006, 0.018]"
 
 
+class TypedIn(LiveRun):
+    """A run in which the experimenter types what is answered."""
+
+    def __init__(self, live: LiveRun) -> None:
+        self.__dict__ = live.__dict__
+
+    def offer(self, event: Event, press: Press | None = None) -> EventVerdict:
+        return super().offer(replace(event, by="experimenter") if isinstance(event, Rating) else event, press)
+
+
 class PersonScreen(SyntheticScreen):
     """Answers as an experimenter types them."""
 
-    def _event(self, position: Position, until_s: float | None) -> Event | None:
-        event = super()._event(position, until_s)
-        return replace(event, by="experimenter") if isinstance(event, Rating) else event
+    def begin(self, live: LiveRun) -> None:
+        super().begin(TypedIn(live))
 
 
 def person_screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> PersonScreen:
