@@ -23,10 +23,11 @@ from experiments.live_run import RunStopped, Screen
 from experiments.load import language_key
 from experiments.run import Finished, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
+from experiments.screens.console.people import doubt_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.study.balance import journals, unread
-from experiments.study.enrolment import look_alike, not_on_record
+from experiments.study.enrolment import not_on_record
 from experiments.study.folders import Place, PlaceError, check_code, known_codes, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
@@ -123,8 +124,8 @@ def _not_on_record(request: RunRequest) -> Iterator[str]:
     """The start window asks by itself, and nobody is asked about synthetic people."""
     code, results = request.participant_id, request.results
     if code and not request.simulated:
-        if other := look_alike(code, known_codes(results, read_register(results))):
-            yield f"participant {code} is new, and {other} is there: if it is the same person, stop, and use {other}"
+        if doubt := doubt_text(code, known_codes(results, read_register(results)), prefix=""):
+            yield f"participant {doubt} If so, stop, and use that code"
         yield from filter(None, [not_on_record(results, code)])
 
 

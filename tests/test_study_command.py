@@ -382,7 +382,7 @@ def test_a_run_asks_about_a_new_code_that_looks_like_one_that_is_there(recoil: R
     recoil("study", "pilot", "--join", "P01", *RIGHT)
     words = warm("run", pilot / "direction.toml", "--participant", "P1", "--results", pilot / "results")
     with AtTerminal(words, pilot) as sitting:
-        sitting.wait_for("recoil: participant P1 is new, and P01 is there: if it is the same person, stop, and use P01")
+        sitting.wait_for("recoil: participant P1 is new, and P01 is there: is it the same person?")
 
 
 def test_a_run_says_nothing_of_facts_where_none_are_asked_for(pilot: Path) -> None:
