@@ -224,12 +224,13 @@ def test_conditional_accuracy_averages_people_not_trials() -> None:
     found = trade.conditional_accuracy(correct, times, ["participant"] * 9, list("aaaabbbbc"), bins=2)
     assert found.mean_time_s.tolist() == pytest.approx([0.65, 0.85])
     assert found.accuracy.tolist() == [0.25, 0.75]
-    assert (found.people, found.left_out) == (2, 1)
+    assert (found.people, found.trials, found.left_out) == (2, 4, 1)
 
 
 def test_conditional_accuracy_without_enough_trials_is_nan() -> None:
     found = trade.conditional_accuracy([1], [0.5], ["participant"], ["a"], bins=5)
     assert np.isnan(found.accuracy).all()
+    assert found.trials == 0
     with pytest.raises(ValueError, match="bins"):
         trade.conditional_accuracy([1], [0.5], ["participant"], ["a"], bins=0)
 
@@ -257,7 +258,7 @@ def test_quantile_probability_points_are_those_of_theory() -> None:
 def test_quantiles_of_answers_that_nobody_gave_are_nan() -> None:
     found = trade.quantile_probability([1] * 6, np.linspace(0.4, 0.9, 6), ["participant"] * 6, ["a"] * 6)
     assert np.isnan(found.quantiles_s[0]).all()
-    assert found.people.tolist() == [0, 1]
+    assert (found.people.tolist(), found.answers.tolist()) == ([0, 1], [0, 6])
     assert found.quantiles_s[1] == pytest.approx(np.quantile(np.linspace(0.4, 0.9, 6), trade.QUANTILES))
 
 

@@ -249,7 +249,7 @@ def test_long_names_that_begin_alike_stay_apart_and_their_whole_is_kept() -> Non
 
 @pytest.fixture(scope="module")
 def ten(tmp_path_factory: pytest.TempPathFactory) -> StudyStatistics:
-    return summarize(read_logs([_logs_of(tmp_path_factory.mktemp("ten"), TEN, people=4)]))
+    return summarize(read_logs([_logs_of(tmp_path_factory.mktemp("ten"), TEN, people=10)]))
 
 
 @pytest.fixture

@@ -19,6 +19,8 @@ from analysis.logs.reading import read_logs
 from analysis.report.page import write_page
 from analysis.report.section import Section
 from analysis.summary.figures.trade import (
+    draws_curve,
+    draws_points,
     figure_conditional_accuracy,
     figure_quantile_probability,
     has_curve,
@@ -36,6 +38,7 @@ from analysis.times.fit import fit
 from analysis.times.likelihood import trials_of
 from analysis.times.own_trials import ordered, own_trials, quantiles
 from analysis.times.people import MOST_PEOPLE, as_trials, fit_people
+from analysis.times.speed_accuracy import SpeedAccuracy
 from analysis.times.trade import ez, ez_people
 from experiments.design.streams import generator
 from experiments.record import tables
@@ -250,7 +253,7 @@ def test_times_from_the_experimenters_hand_are_refused_with_the_reason(tmp_path:
     assert not section.pictures
     (shown,) = shown_trades(statistics)
     for figure in (figure_conditional_accuracy, figure_quantile_probability):
-        with pytest.raises(ValueError, match="needs somebody"):
+        with pytest.raises(ValueError, match="needs 20"):
             figure(shown.trade, shown.names, tmp_path / "none")
 
 
@@ -386,12 +389,37 @@ def test_whatever_the_log_there_is_a_section_and_no_nan(kind: str, people: int, 
     clear = fits["together"] is not None and fits["together"]["reason"] is None
     one_fit = any("With one participant" in text for text in told)
     assert one_fit == (people == 1 and clear)
-    assert bool(shown - {"figure-response-times"}) == (kind not in ("no times", "one trial", "one time"))
+    assert any("trials behind a point" in text for text in told) == isinstance(trade_of.trade, SpeedAccuracy)
+
+
+def test_what_rests_on_fewer_than_twenty_trials_is_not_drawn_and_the_report_says_so(tmp_path: Path) -> None:
+    """100 trials of one method are five bins of 20; of the others 95 are five of 19, and 19 errors are not 20."""
+    rows = trial_rows("P1", sets=20)
+    rows = [row for row in rows if row["method"] == METHODS[0] or int(row["trial"]) <= 95]
+    for row in rows:
+        wrong = int(row["trial"]) <= (20 if row["method"] == METHODS[0] else 19)
+        other = "backward" if row["direction"] == "forward" else "forward"
+        row |= {"response": other if wrong else row["direction"], "correct": str(int(not wrong))}
+    write_rows(trials_path(tmp_path / "study", "P1"), rows)
+    section = sections_of(statistics := summarize(read_logs([tmp_path / "study"])))[0]
+    assert [text for text in section.paragraphs if text.startswith("No ")] == [
+        "No conditional accuracy function is drawn with fewer than 20 trials behind a point: Asymmetric Force I (19), "
+        "Asymmetric Force II (19).",
+        "No time quantiles are drawn of fewer than 20 answers by participants with 5 of the kind: errors of Asymmetric "
+        "Force I (19), Asymmetric Force II (19).",
+    ]
+    (shown,) = shown_trades(statistics)
+    cells = [cell for of_method in shown.trade.methods.values() for cell in of_method.values()]
+    assert [draws_curve(cell) for cell in cells] == [True, False, False]
+    assert [draws_points(cell) for cell in cells] == [(True, True), (False, True), (False, True)]
+    alts = {picture.stem: picture.alt for picture in section.pictures}
+    assert "Asymmetric" not in alts["figure-conditional-accuracy"]
+    assert "median of errors" not in alts["figure-quantile-probability"].partition("Asymmetric")[2]
 
 
 @pytest.mark.parametrize("kind", ["all correct", "told by method"])
 def test_figures_are_drawn_where_there_is_little_to_draw(kind: str, tmp_path: Path) -> None:
-    write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=2), kind))
+    write_rows(trials_path(tmp_path, "P1"), changed(trial_rows("P1", sets=20), kind))
     (found,) = shown_trades(summarize(read_logs([tmp_path])))
     figure_conditional_accuracy(found.trade, found.names, tmp_path / "curve")
     figure_quantile_probability(found.trade, found.names, tmp_path / "points")

@@ -24,11 +24,15 @@ QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ConditionalAccuracy:
-    """One condition's accuracy over time, a value each bin, averaged over the `people` that have enough trials."""
+    """One condition's accuracy over time, a value each bin, averaged over the `people` that have enough trials.
+
+    `trials`: behind the value that rests on the fewest, those of all these people together.
+    """
 
     mean_time_s: FloatArray
     accuracy: FloatArray
     people: int
+    trials: int
     left_out: int  # people with fewer trials than bins
 
 
@@ -36,12 +40,14 @@ class ConditionalAccuracy:
 class QuantileProbability:
     """One condition's points: each answer's probability and its time quantiles, averaged over people.
 
-    Quantiles are NaN where nobody has enough answers of the kind; `people` says how many had.
+    Quantiles are NaN where nobody has enough answers of the kind; `people` says how many had, `answers` how many such
+    answers they gave.
     """
 
     probability: FloatArray  # (2,): errors, correct answers
     quantiles_s: FloatArray  # (2, quantiles)
     people: NDArray[np.intp]  # (2,)
+    answers: NDArray[np.intp]  # (2,)
 
 
 def conditional_accuracy(
@@ -69,6 +75,7 @@ def conditional_accuracy(
         mean_time_s=mean_time_s,
         accuracy=accuracy,
         people=enough.people,
+        trials=int(trials.sum(axis=0).min()),
         left_out=everybody.people - enough.people,
     )
 
@@ -100,14 +107,18 @@ def quantile_probability(
     right = answers(correct, "correct", times.size)
     everybody = ordered(people, times)
     share = float(everybody.means(right).mean()) if everybody.people else np.nan
-    points, counts = [], []
+    points, counts, given = [], [], []
     for kind in (0.0, 1.0):
         enough = everybody.only(right == kind).of_at_least(max(fewest, 1))
         nobody = np.full(len(quantiles), np.nan)
         points.append(own_quantiles(times, enough, quantiles).mean(axis=0) if enough.people else nobody)
         counts.append(enough.people)
+        given.append(enough.rows.size)
     return QuantileProbability(
-        probability=np.array([1.0 - share, share]), quantiles_s=np.array(points), people=np.array(counts, dtype=np.intp)
+        probability=np.array([1.0 - share, share]),
+        quantiles_s=np.array(points),
+        people=np.array(counts, dtype=np.intp),
+        answers=np.array(given, dtype=np.intp),
     )
 
 

@@ -43,6 +43,9 @@ _Cells = Sequence[tuple[int, CellTrade]]
 _ACROSS = 3
 """So many panels stand side by side."""
 
+FEWEST_A_POINT = 20
+"""A point that is drawn rests on so many trials (assumed): the standard error of a rate is then 11 points at most."""
+
 
 class _Draw(Protocol):
     def __call__(self, axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:
@@ -79,31 +82,42 @@ class TradeNames:
 def figure_conditional_accuracy(trade: Trade, names: TradeNames, path_stem: Path) -> None:
     """Accuracy over response time, a line a condition, a panel an instruction; PNG, SVG and PDF are written.
 
-    `ValueError` if nobody has a trial in every bin.
+    `ValueError` if no condition has enough trials in every bin.
     """
     if not isinstance(trade, SpeedAccuracy) or not has_curve(trade):
-        raise ValueError("the figure of conditional accuracy needs somebody with a trial in every bin")
+        raise ValueError(f"the figure of conditional accuracy needs {FEWEST_A_POINT} trials in each bin of a condition")
     _panels(names, trade, path_stem, _CURVES)
 
 
 def figure_quantile_probability(trade: Trade, names: TradeNames, path_stem: Path) -> None:
     """Quantiles of the times of errors and correct answers over their probabilities; PNG, SVG and PDF are written.
 
-    `ValueError` if nobody has enough answers of a kind.
+    `ValueError` if no condition has enough answers of a kind.
     """
     if not isinstance(trade, SpeedAccuracy) or not has_points(trade):
-        raise ValueError("the quantile-probability plot needs somebody with five answers of a kind")
+        raise ValueError(f"the quantile-probability plot needs {FEWEST_A_POINT} answers of a kind in a condition")
     _panels(names, trade, path_stem, _POINTS)
 
 
 def has_curve(trade: Trade) -> bool:
     """Whether there is a conditional accuracy function to draw."""
-    return any(cell.conditional_accuracy.people for cell in _cells_of(trade))
+    return any(map(draws_curve, _cells_of(trade)))
 
 
 def has_points(trade: Trade) -> bool:
     """Whether there is a point of a quantile-probability plot."""
-    return any(any(cell.quantile_probability.people) for cell in _cells_of(trade))
+    return any(any(draws_points(cell)) for cell in _cells_of(trade))
+
+
+def draws_curve(cell: CellTrade) -> bool:
+    """Whether a condition's conditional accuracy is drawn: each of its points rests on enough trials."""
+    return cell.conditional_accuracy.trials >= FEWEST_A_POINT
+
+
+def draws_points(cell: CellTrade) -> tuple[bool, bool]:
+    """Whether the time quantiles of a condition's errors, and of its correct answers, are drawn."""
+    errors, correct = cell.quantile_probability.answers >= FEWEST_A_POINT
+    return bool(errors), bool(correct)
 
 
 def _cells_of(trade: Trade) -> list[CellTrade]:
@@ -161,7 +175,7 @@ def _kinds(panel: _Panel) -> list[Line2D]:
 def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool) -> None:  # noqa: ARG001 - one of two
     for i, cell in cells:
         curve = cell.conditional_accuracy
-        if curve.people:
+        if draws_curve(cell):
             axes.plot(
                 curve.mean_time_s,
                 100.0 * np.array(curve.accuracy),
@@ -175,7 +189,7 @@ def _draw_curves(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
 
 
 def _limit_curves(axes: Axes, trade: SpeedAccuracy) -> None:
-    slowest = np.nanmax([cell.conditional_accuracy.mean_time_s for cell in _cells_of(trade)])
+    slowest = max(max(cell.conditional_accuracy.mean_time_s) for cell in _cells_of(trade) if draws_curve(cell))
     axes.set_xlim(0.0, 1.05 * slowest)
     axes.set_ylim(0.0, 100.0)
 
@@ -186,7 +200,7 @@ def _draw_points(axes: Axes, cells: _Cells, trade: SpeedAccuracy, *, last: bool)
     for i, cell in cells:
         points = cell.quantile_probability
         for kind, fill in ((0, "white"), (1, method_colour(i))):
-            if points.people[kind]:
+            if draws_points(cell)[kind]:
                 probability, quantiles = points.probability[kind], points.quantiles_s[kind]
                 columns.append((probability, quantiles))
                 axes.plot(
@@ -212,7 +226,9 @@ def _limit_points(axes: Axes, trade: SpeedAccuracy) -> None:
 
 def _highest(trade: SpeedAccuracy) -> float:
     """The end of the axis of quantiles."""
-    return float(1.05 * np.nanmax([cell.quantile_probability.quantiles_s for cell in _cells_of(trade)]))
+    cells = _cells_of(trade)
+    shown = [max(cell.quantile_probability.quantiles_s[k]) for cell in cells for k in (0, 1) if draws_points(cell)[k]]
+    return float(1.05 * max(shown))
 
 
 def _join(axes: Axes, columns: Sequence[tuple[float, Sequence[float]]], trade: SpeedAccuracy) -> None:

@@ -6,13 +6,20 @@ from collections.abc import Iterator
 
 from analysis.report import apa
 from analysis.report.section import Picture, Section, Table
-from analysis.summary.figures.trade import TradeNames, has_curve, has_points
+from analysis.summary.figures.trade import (
+    FEWEST_A_POINT,
+    TradeNames,
+    draws_curve,
+    draws_points,
+    has_curve,
+    has_points,
+)
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import response_times_picture
 from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
 from analysis.times.people import Mean
 from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
-from device.messages import how_many
+from device.messages import first_few, how_many
 
 _UNITS = {"drift": "1/√s", "boundary": "√s", "start": "0 to 1", "non_decision_s": "s"}
 
@@ -191,7 +198,7 @@ def trade_sections(report: ReportData) -> Iterator[Section]:
             times = _times_picture(report) if not shown.of else ()
             yield Section(
                 title=title,
-                paragraphs=(_used(shown, trade), trade.caveats["means"], *_unpaired(trade)),
+                paragraphs=(_used(shown, trade), trade.caveats["means"], *_unpaired(trade), *_not_drawn(shown, trade)),
                 pictures=(*times, *trade_pictures(shown, trade)),
                 tables=tuple(table for table in trade_tables(trade, shown.names) if table.rows),
             )
@@ -300,10 +307,34 @@ def trade_pictures(shown: ShownTrade, trade: SpeedAccuracy) -> tuple[Picture, ..
     return tuple(pictures)
 
 
+_FEW_NAMED = 6
+
+
+def _not_drawn(shown: ShownTrade, trade: SpeedAccuracy) -> Iterator[str]:
+    """What the two figures leave out for want of trials, or that there is no such figure for it."""
+    cells = tuple(cells_of(trade, shown.names))
+    curves = [f"{name} ({cell.conditional_accuracy.trials:,})" for name, cell in cells if not draws_curve(cell)]
+    if curves:
+        yield (
+            f"No conditional accuracy function is drawn with fewer than {FEWEST_A_POINT} trials behind a point: "
+            f"{first_few(curves, _FEW_NAMED)}."
+        )
+    kinds = []
+    for k, kind in enumerate(("errors", "correct answers")):
+        given = [(name, cell.quantile_probability.answers[k]) for name, cell in cells if not draws_points(cell)[k]]
+        if given:
+            kinds.append(f"{kind} of {first_few([f'{name} ({count:,})' for name, count in given], _FEW_NAMED)}")
+    if kinds:
+        yield (
+            f"No time quantiles are drawn of fewer than {FEWEST_A_POINT} answers by participants with 5 of the kind: "
+            f"{'; '.join(kinds)}."
+        )
+
+
 def _curve_words(trade: SpeedAccuracy, names: TradeNames) -> Iterator[str]:
     for name, cell in cells_of(trade, names):
         curve = cell.conditional_accuracy
-        if curve.people:
+        if draws_curve(cell):
             ends = [f"{apa.percent(curve.accuracy[k])} at {apa.number(curve.mean_time_s[k])} s" for k in (0, -1)]
             yield f"{name} from {ends[0]} to {ends[1]}"
 
@@ -311,6 +342,7 @@ def _curve_words(trade: SpeedAccuracy, names: TradeNames) -> Iterator[str]:
 def _points_words(trade: SpeedAccuracy, names: TradeNames) -> Iterator[str]:
     for name, cell in cells_of(trade, names):
         points = cell.quantile_probability
-        kinds = zip(("errors", "correct answers"), points.quantiles_s, points.people, strict=True)
-        medians = [f"median of {kind} {apa.number(row[2])} s" for kind, row, count in kinds if count]
-        yield ", ".join([f"{name} {apa.percent(points.probability[1])} correct", *medians])
+        kinds = zip(("errors", "correct answers"), points.quantiles_s, draws_points(cell), strict=True)
+        medians = [f"median of {kind} {apa.number(row[2])} s" for kind, row, is_drawn in kinds if is_drawn]
+        if medians:
+            yield ", ".join([f"{name} {apa.percent(points.probability[1])} correct", *medians])
