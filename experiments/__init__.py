@@ -1,1 +1,1 @@
-"""Words and rules that experiments are made of; the feature of the house stands in `experiments.cli`."""
+"""The lab: experiments are planned, run and recorded here, and the people behind them kept count of."""
