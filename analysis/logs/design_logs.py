@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,27 +114,40 @@ def _shared(design: DesignConfig) -> FileValues:
     return design.model_dump(mode="json", include=set(_TOGETHER))
 
 
-def frozen_designs(folders: Iterable[Path]) -> dict[str, str]:
-    """The keys of the designs that are frozen in these studies, as last amended, each with what freezes it."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenDesign:
+    """A design as a study's last preregistration freezes it; `by` names that."""
+
+    design: DesignConfig
+    key: str
+    by: str
+
+
+FrozenByStudy = Mapping[str, Mapping[str, FrozenDesign]]
+"""By the name of a study, its frozen designs by theirs."""
+
+
+def frozen_designs(folder: Path) -> dict[str, FrozenDesign]:
+    """The designs that are frozen in a study, as last amended, by their names."""
     found = {}
-    for last in filter(None, (read_chain(folder).last for folder in folders)):
-        for file in last.designs:
-            with suppress(ConfigError):  # of a version that had other keys
-                frozen = checked_table(DesignConfig, dict(last.files[file]), file)
-                found[design_key(frozen)] = f"preregistration {last.number}"
+    last = read_chain(folder).last
+    for file in () if last is None else last.designs:
+        with suppress(ConfigError):  # of a version that had other keys
+            design = checked_table(DesignConfig, dict(last.files[file]), file)
+            by = f"preregistration {last.number}"
+            found[design.design] = FrozenDesign(design=design, key=design_key(design), by=by)
     return found
 
 
-def _another_design(design: DesignConfig, kept: DesignConfig, frozen: str | None) -> str:
-    """What is said of a log of another design than the one that is analysed: the keys that differ, and which it is."""
+def _another_design(design: DesignConfig, kept: DesignConfig, whose: str, note: str = "") -> str:
+    """What is said of a log of another design than one to be kept: the keys that differ, and which it is."""
     keys = [
         f"{change.key} = {plain_value(change.now)}, not {plain_value(change.frozen)}"
         for change in changed_keys(design.design, _shared(kept), _shared(design))
     ]
-    than = "most logs of that name" if frozen is None else f"{frozen} freezes"
     return (
-        f"was made with another design {design.design!r} than {than}: {first_few(keys, _KEYS_TOLD)} "
-        f"(rule: {ONE_DESIGN}); {APART}"
+        f"was made with another design {design.design!r} than {whose}: {first_few(keys, _KEYS_TOLD)} "
+        f"(rule: {ONE_DESIGN}){note}; {APART}"
     )
 
 
@@ -228,29 +241,63 @@ def _check_onsets(rows: Sequence[Mapping[str, object]]) -> None:
 
 
 def logs_by_design(
-    logs: Sequence[tuple[DesignLog, str]], frozen: Mapping[str, str], *, several: bool
-) -> tuple[list[DesignLogs], dict[str, str]]:
-    """The logs by design, each with its study; and by their keys what is said of those of another design of the name.
+    logs: Sequence[tuple[DesignLog, str]], frozen: FrozenByStudy, *, several: bool
+) -> tuple[list[DesignLogs], dict[tuple[str, str], str]]:
+    """The logs by design, each with its study; and by study and key what is said of those of another design.
 
-    Of several designs of a name the `frozen` one is analysed, else that of most logs. With several studies a
-    participant is `study/code`.
+    A study that froze a design is there with the logs of that alone. Of several designs of a name then the one that some
+    study froze is analysed, else that of most logs. With several studies a participant is `study/code`.
     """
-    designs = {log.key: log.design for log, _ in logs}
-    logs_of = Counter(log.key for log, _ in logs)
-    keys_of = dict[str, list[str]]()
-    for key, design in designs.items():
-        keys_of.setdefault(design.design, []).append(key)
-    main = {name: max(keys, key=lambda key: (key in frozen, logs_of[key])) for name, keys in keys_of.items()}
-    found = []
-    for key in main.values():
-        some = [(log, study) for log, study in logs if log.key == key]
-        rows = [
-            {**row, "participant_id": f"{study}/{log.code}" if several else log.code, "study": study}
-            for log, study in some
-            for row in log.rows
-        ]
-        names = [column.name for column in columns(some[0][0].design)]
-        table = pd.DataFrame(rows, columns=["study", *names])
-        found.append(DesignLogs(design=some[0][0].design, table=table, gun_labels=some[0][0].gun_labels))
-    others = [(key, design, main[design.design]) for key, design in designs.items() if key not in main.values()]
-    return found, {key: _another_design(design, designs[kept], frozen.get(kept)) for key, design, kept in others}
+    named = dict[str, list[tuple[DesignLog, str]]]()
+    for log, study in logs:
+        named.setdefault(log.design.design, []).append((log, study))
+    found, others = [], dict[tuple[str, str], str]()
+    for name, some in named.items():
+        own = {study: of_study[name] for study, of_study in frozen.items() if name in of_study}
+        kept = [(log, study) for log, study in some if study not in own or log.key == own[study].key] or some
+        key = _main(kept, own)
+        used = [(log, study) for log, study in kept if log.key == key]
+        used_keys = {(study, log.key) for log, study in used}
+        rest = [(log, study) for log, study in some if (study, log.key) not in used_keys]
+        others |= _told_of_others(rest, used[0][0], own, several=several)
+        found.append(_together(used, several=several))
+    return found, others
+
+
+def _main(logs: Sequence[tuple[DesignLog, str]], own: Mapping[str, FrozenDesign]) -> str:
+    """The key of the design that is analysed."""
+    counts, frozen = Counter(log.key for log, _ in logs), {one.key for one in own.values()}
+    return max(counts, key=lambda key: (key in frozen, counts[key]))
+
+
+def _told_of_others(
+    logs: Sequence[tuple[DesignLog, str]], main: DesignLog, own: Mapping[str, FrozenDesign], *, several: bool
+) -> dict[tuple[str, str], str]:
+    """By study and key, why logs are left out: their study froze another design, or another design is analysed."""
+
+    def by(study: str) -> str:
+        return f"{own[study].by} of {study!r}" if several else own[study].by
+
+    frozen = next((f"{by(study)} freezes" for study, one in own.items() if one.key == main.key), None)
+    told = {}
+    for log, study in logs:
+        if study in own and log.key != own[study].key:
+            told[study, log.key] = _another_design(log.design, own[study].design, f"{by(study)} freezes")
+        else:
+            note = f", though it is as {by(study)} freezes it" if study in own else ""
+            whose = frozen or "most logs of that name"
+            told[study, log.key] = _another_design(log.design, main.design, whose, note)
+    return told
+
+
+def _together(logs: Sequence[tuple[DesignLog, str]], *, several: bool) -> DesignLogs:
+    """Logs of one design as one table."""
+    rows = [
+        {**row, "participant_id": f"{study}/{log.code}" if several else log.code, "study": study}
+        for log, study in logs
+        for row in log.rows
+    ]
+    first = logs[0][0]
+    names = [column.name for column in columns(first.design)]
+    table = pd.DataFrame(rows, columns=["study", *names])
+    return DesignLogs(design=first.design, table=table, gun_labels=first.gun_labels)

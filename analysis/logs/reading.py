@@ -251,20 +251,22 @@ def _designed(
 def _by_design(reading: LogsSoFar, logs: Mapping[int, DesignLog], studies: Mapping[int, str]) -> tuple[DesignLogs, ...]:
     """The logs by design; one that was made with another design than the one that is analysed is left out."""
     several = len(set(studies.values())) > 1
-    frozen = frozen_designs(_study_folders(reading.paths[number // LOGS_A_FILE] for number in logs))
+    folders = {studies[number]: _study_of(reading.paths[number // LOGS_A_FILE]) for number in logs}
+    frozen = {study: frozen_designs(folder) for study, folder in folders.items()}
     found, others = logs_by_design([(log, studies[number]) for number, log in logs.items()], frozen, several=several)
     for number, log in logs.items():
-        if log.key in others:
+        why = others.get((studies[number], log.key))
+        if why is not None:
             path = reading.paths.pop(number // LOGS_A_FILE)
             study = reading.studies[number]
-            reading.problems.append(BadLogError(others[log.key]).of(Path(path), log.code, log.design.design, study))
+            reading.problems.append(BadLogError(why).of(Path(path), log.code, log.design.design, study))
     return tuple(found)
 
 
-def _study_folders(paths: Iterable[str]) -> list[Path]:
-    """The folders of the studies that logs belong to."""
-    results = dict.fromkeys(Path(results_above(os.path.abspath(path))) for path in paths)  # noqa: PTH100 - no link read
-    return [study_folder(one, one) for one in results]
+def _study_of(path: str) -> Path:
+    """The folder of the study that a log belongs to."""
+    results = Path(results_above(os.path.abspath(path)))  # noqa: PTH100 - no link is read
+    return study_folder(results, results)
 
 
 def _batches(found: Mapping[str, str], track: Track, made: Mapping[str, bytes]) -> Iterator[list[WaitingFile]]:
