@@ -10,7 +10,7 @@ from typing import Any
 
 from experiments.config.setup import canonical_json, sha256
 from experiments.design.plan import Plan
-from experiments.record.journal import Record, link_of
+from experiments.record.journal import Record, link_of, record_line
 
 
 def raw(path: Path) -> list[dict[str, Any]]:
@@ -32,7 +32,7 @@ def forged(entries: Sequence[dict[str, Any]]) -> bytes:
     lines: list[bytes] = []
     for n, entry in enumerate(entries):
         before = link_of(lines[-1]) if lines else ""
-        lines.append(canonical_json(entry | {"n": n, "link": before}) + b"\n")
+        lines.append(record_line(entry | {"n": n, "link": before}))
     return b"".join(lines)
 
 

@@ -33,7 +33,7 @@ from experiments.run_request import RunRequest
 from experiments.screens.console.people import changed_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import register
-from experiments.study.changes import plain_value
+from experiments.study.changes import plain_value, setup_changes, setup_key
 from experiments.study.folders import PlaceError, freeze_status, open_study, overview
 from experiments.study.new_study import new_study
 from experiments.study.preregistration import PreregistrationError, run_warnings
@@ -336,6 +336,21 @@ def test_every_single_key_is_found_alone(frozen: Path) -> None:
             assert (only.file, only.key, only.frozen, only.now) == (file, key, before, after)
             (frozen / file).write_bytes(whole)
     assert freeze_status(frozen).changes == ()
+
+
+def test_another_order_of_questions_or_factors_is_a_change(tmp_path: Path) -> None:
+    """Questions are asked in it, and conditions planned."""
+    new_study(tmp_path / "study", "realism")
+    config = tmp_path / "study" / "realism.toml"
+    freeze(config.parent, "", RealClock())
+    before, whole = load_setup(config), config.read_text()
+    top, first, second, rest = re.split(r"(?=\[questions|\[fatigue)", whole)
+    config.write_text(top + second + first + rest)
+    (only,) = freeze_status(config.parent).changes
+    assert str(only) == 'realism.toml: questions: frozen ["realism", "comfort"], now ["comfort", "realism"]'
+    assert [change.key for change in setup_changes(before.record(), load_setup(config).record())] == ["questions"]
+    assert setup_key(before.record()) != setup_key(load_setup(config).record())
+    assert freeze(config.parent, "asked the other way round", RealClock()).is_new
 
 
 def test_a_comment_and_a_default_that_is_spelled_out_change_nothing(frozen: Path) -> None:

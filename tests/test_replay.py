@@ -13,13 +13,13 @@ import pytest
 
 from device import DeviceError
 from experiments.clock import RealClock, VirtualClock
-from experiments.config.setup import Setup, canonical_json
+from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
 from experiments.earlier_run import NotAsItBegan, earlier_run, way_back_to_gun
 from experiments.rebuild import rebuild
-from experiments.record.journal import Journal, JournalError, read_journal
+from experiments.record.journal import Journal, JournalError, read_journal, record_line
 from experiments.record.replay import go_on, history, replay
 from experiments.run import run
 from experiments.run_request import Again, ParticipantOptions, RunRequest
@@ -242,7 +242,7 @@ def test_another_seed_is_refused_and_the_same_is_not(name: str, unbroken: dict[s
 
 
 def with_plan(line: bytes, plan: dict[str, Any], **others: object) -> bytes:
-    return canonical_json(json.loads(line) | {"plan": plan} | others) + b"\n"
+    return record_line(json.loads(line) | {"plan": plan} | others)
 
 
 @pytest.mark.parametrize("name", SETUPS)
@@ -293,7 +293,7 @@ def test_an_answer_that_was_changed_to_none_is_refused_with_its_line(
     answer = whole.records[6]
     assert answer["body"]["kind"] == "answered"
     answer["body"]["value"] = "left"
-    journal.write_bytes(b"".join([*whole.lines[:6], canonical_json(answer) + b"\n", *whole.lines[7:9]]))
+    journal.write_bytes(b"".join([*whole.lines[:6], record_line(answer), *whole.lines[7:9]]))
     with pytest.raises(JournalError, match="line 8: does not follow from line 7, which was changed"):
         run(request("direction", tmp_path, "resume"), synthetic_screen, VirtualClock())
     journal.write_bytes(forged([*whole.records[:6], answer, *whole.records[7:9]]))

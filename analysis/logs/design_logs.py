@@ -129,9 +129,11 @@ FrozenByStudy = Mapping[str, Mapping[str, FrozenDesign]]
 
 def frozen_designs(folder: Path) -> dict[str, FrozenDesign]:
     """The designs that are frozen in a study, as last amended, by their names."""
-    found = {}
+    found = dict[str, FrozenDesign]()
     last = read_chain(folder).last
-    for file in () if last is None else last.designs:
+    if last is None:
+        return found
+    for file in last.designs:
         with suppress(ConfigError):  # of a version that had other keys
             design = checked_table(DesignConfig, dict(last.files[file]), file)
             by = f"preregistration {last.number}"
@@ -245,8 +247,8 @@ def logs_by_design(
 ) -> tuple[list[DesignLogs], dict[tuple[str, str], str]]:
     """The logs by design, each with its study; and by study and key what is said of those of another design.
 
-    A study that froze a design is there with the logs of that alone. Of several designs of a name then the one that some
-    study froze is analysed, else that of most logs. With several studies a participant is `study/code`.
+    A study that froze a design is there with the logs of that alone. Of several designs of a name then one that is
+    frozen is analysed, else that of most logs. With several studies a participant is `study/code`.
     """
     named = dict[str, list[tuple[DesignLog, str]]]()
     for log, study in logs:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import Field as DataclassField
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -180,6 +181,19 @@ def canonical_json(value: object) -> bytes:
 def sha256(value: object) -> str:
     """The SHA-256 of a value's canonical JSON, in hexadecimal."""
     return hashlib.sha256(canonical_json(value)).hexdigest()
+
+
+_IN_ORDER = ("factors", "questions")
+"""Tables of a design whose order means something: conditions are planned, and questions asked, in it."""
+
+
+def orders_of(values: Mapping[str, object]) -> dict[str, list[str]]:
+    """The names in those tables of a design whose order means something: hashes do not tell it.
+
+    >>> orders_of({"questions": {"strength": {}, "comfort": {}}, "title": "A study"})
+    {'questions': ['strength', 'comfort']}
+    """
+    return {name: [*table] for name in _IN_ORDER if isinstance(table := values.get(name), Mapping)}
 
 
 Config_co = TypeVar("Config_co", bound=Model, covariant=True)

@@ -2,7 +2,8 @@
 
 A record of a design, a gun or a study has all their keys, with their defaults. A key that it lacks was unknown to the
 version of Recoil that wrote it: it stands for its default, which means what that version did. A key that this version
-does not know is a change. So hashes can say that two records are the same, and not that something was changed.
+does not know is a change. So hashes can say that two records are the same, but for the order of
+factors and questions, and not that something was changed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pydantic import JsonValue, ValidationError
 
 from device.messages import first_few
 from experiments.config.door import Model
-from experiments.config.setup import GunConfig, Setup, sha256
+from experiments.config.setup import GunConfig, Setup, orders_of, sha256
 from experiments.design.config import DesignConfig
 from experiments.synthetic.laws import SyntheticAnswers
 
@@ -53,13 +54,20 @@ def plain_value(value: JsonValue) -> str:
 def changed_keys(
     file: str, frozen: FileValues, now: FileValues, model: type[Model] | None = None
 ) -> Iterator[KeyChange]:
-    """The keys of one file that differ. `model`: what it is read as, if its defaults are recorded."""
+    """The keys of one file that differ, and the tables whose names stand in another order.
+
+    `model`: what it is read as, if its defaults are recorded.
+    """
     before, after = (dict(_leaves(without_reasons(values))) for values in (frozen, now))
     if model is not None and before.keys() != after.keys():
         before, after = _with_defaults(model, frozen), _with_defaults(model, now)
     for key in dict.fromkeys([*before, *after]):
         if before.get(key) != after.get(key) or isinstance(before.get(key), bool) != isinstance(after.get(key), bool):
             yield KeyChange(file=file, key=key, frozen=before.get(key), now=after.get(key))
+    was, is_now = orders_of(frozen), orders_of(now)
+    for table in was.keys() & is_now.keys():
+        if was[table] != is_now[table] and sorted(was[table]) == sorted(is_now[table]):
+            yield KeyChange(file=file, key=table, frozen=[*was[table]], now=[*is_now[table]])
 
 
 def _with_defaults(model: type[Model], recorded: FileValues) -> dict[str, JsonValue]:
@@ -99,8 +107,10 @@ def changes_told(changes: Sequence[KeyChange]) -> str:
 
 def setup_key(setup: object) -> str:
     """What setups share between which nothing differs, by whichever version they were recorded."""
-    parts = [_with_defaults(model, table_in(setup, part)) for part, model in _OF_SETUP.items()]
-    return sha256([{key: value for key, value in part.items() if value is not None} for part in parts])
+    tables = [(model, table_in(setup, part)) for part, model in _OF_SETUP.items()]
+    parts = [_with_defaults(model, table) for model, table in tables]
+    known = [{key: value for key, value in part.items() if value is not None} for part in parts]
+    return sha256([known, [orders_of(table) for _, table in tables]])
 
 
 def table_in(found: object, key: str) -> FileValues:
