@@ -638,6 +638,17 @@ def several() -> Setup[DesignConfig]:
     return direction_with(methods=("vibration",), sets=2, repetitions=2, questions={"strength": scale, "words": words})
 
 
+@pytest.mark.parametrize("state", [State.RATING, State.DESCRIBING, State.SAVING])
+def test_a_question_after_its_set_names_its_trial_once(several: Setup[DesignConfig], state: State) -> None:
+    for setup, its_set in ((several, "set 1 of 2 · session 1 of 1"), (PREFERENCE, "")):
+        asked = rate(plan_of(setup).trials[1])
+        here = seen(setup, Position(states=(state,), step=asked))
+        assert view.where_text(here) == its_set
+        in_other_words = replace(here.about, messages=replace(here.about.messages, place="{number}/{of}"))
+        others = replace(here, about=in_other_words), replace(here, position=Position(step=prepare(asked.trial)))
+        assert all(view.where_text(other).startswith("Trial 2 of ") for other in others)
+
+
 def test_a_trial_is_done_when_all_that_is_asked_at_once_is_answered(several: Setup[DesignConfig]) -> None:
     first, second, *_ = plan_of(several).trials
     strength = replace(rate(first), question="strength", later=False)

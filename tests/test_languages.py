@@ -175,7 +175,7 @@ def test_a_catalogue_would_translate_what_the_console_says_and_leave_its_values(
     plan = plan_of(load_setup("direction").config, "P01", 1)
     plain = texts.place_text(plan, plan.trials[0])
     monkeypatch.setattr(phrases_of_the_console, "CATALOGUE", Pseudo())
-    assert texts.place_text(plan, plan.trials[0]) == "[[Trial 1 of 20] · set 1 of 4 · session 1 of 3]"
+    assert texts.place_text(plan, plan.trials[0]) == "[Trial 1 of 20] · [set 1 of 4 · session 1 of 3]"
     assert texts.shots_text(2) == "[2 shots]"
     assert plain == "Trial 1 of 20 · set 1 of 4 · session 1 of 3"
 

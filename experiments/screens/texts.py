@@ -39,22 +39,23 @@ def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
 
 def place_text(plan: Plan, trial: Trial) -> str:
     """Where a trial stands: in its session, set and run."""
-    in_session = [other for other in plan.trials if other.session == trial.session]
-    where = phrase(
-        "Trial {trial} of {at_most}{in_session}", trial=trial.trial, at_most=_at_most(plan), in_session=len(in_session)
-    )
-    sessions, sets = plan.trials[-1].session, in_session[-1].set
-    return (
-        where
-        if sessions == sets == 1
-        else phrase(
-            "{where} · set {set} of {sets} · session {session} of {sessions}",
-            where=where,
-            set=trial.set,
-            sets=sets,
-            session=trial.session,
-            sessions=sessions,
-        )
+    in_session = sum(other.session == trial.session for other in plan.trials)
+    where = phrase("Trial {trial} of {at_most}{count}", trial=trial.trial, at_most=_at_most(plan), count=in_session)
+    return " · ".join(filter(None, (where, set_text(plan, trial))))
+
+
+def set_text(plan: Plan, trial: Trial) -> str:
+    """Where the set of a trial stands, in its session and run; empty if it is the only one."""
+    sessions = plan.trials[-1].session
+    sets = [other.set for other in plan.trials if other.session == trial.session][-1]
+    if sessions == sets == 1:
+        return ""
+    return phrase(
+        "set {set} of {sets} · session {session} of {sessions}",
+        set=trial.set,
+        sets=sets,
+        session=trial.session,
+        sessions=sessions,
     )
 
 

@@ -19,7 +19,7 @@ from experiments.screens.phrases import phrase
 from experiments.session.history import History, trial_at
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Describe, Outcome, Rate, Step
+from experiments.session.steps import Asking, Describe, Outcome, Rate, Step
 
 THANK_PARTICIPANT = phrase("Thank the participant.")
 """The last sentence, where nothing else comes next."""
@@ -196,13 +196,22 @@ def method_text(about: About, trial: Trial) -> str:
 
 
 def where_text(seen: Seen) -> str:
-    """Where the run stands: trial, set, session; nowhere, if it ended before it began."""
+    """Where the run stands: trial, set, session; nowhere, if it ended before it began.
+
+    A question after the set is headed by its trial, in the participant's words: in the same ones it is not named twice.
+    """
     if seen.ended is not None and seen.position.step is None:
         return ""
-    place, plan = texts.place_text(seen.about.plan, seen.here), seen.about.plan
-    method = method_text(seen.about, seen.here) if plan.trials[-1].session > 1 else ""
-    track = texts.track_text(plan, seen.told, seen.here), texts.chosen_text(seen.told, seen.here)
+    plan, step, here = seen.about.plan, seen.position.step, seen.here
+    asked = isinstance(step, Asking) and step.later and seen.position.state in _ASKED
+    headed = asked and seen.about.messages.place == ENGLISH_MESSAGES.place
+    place = texts.set_text(plan, here) if headed else texts.place_text(plan, here)
+    method = method_text(seen.about, here) if plan.trials[-1].session > 1 else ""
+    track = texts.track_text(plan, seen.told, here), texts.chosen_text(seen.told, here)
     return " · ".join(filter(None, (f"{place}{method}", *track)))
+
+
+_ASKED = (State.ASKING, State.RATING, State.DESCRIBING, State.SAVING)
 
 
 def bands(seen: Seen) -> list[tuple[str, str]]:
