@@ -27,7 +27,7 @@ from experiments.screens.console.people import doubt_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.study.balance import journals, unread
-from experiments.study.enrolment import not_on_record
+from experiments.study.enrolment import code_prefix_of, not_on_record
 from experiments.study.folders import Place, PlaceError, check_code, known_codes, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
@@ -124,8 +124,8 @@ def _not_on_record(request: RunRequest) -> Iterator[str]:
     """The start window asks by itself, and nobody is asked about synthetic people."""
     code, results = request.participant_id, request.results
     if code and not request.simulated:
-        if doubt := doubt_text(code, known_codes(results, read_register(results)), prefix=""):
-            yield f"participant {doubt} If so, stop, and use that code"
+        if doubt := doubt_text(code, known_codes(results, read_register(results)), code_prefix_of(results)):
+            yield f"participant {doubt} The run goes on all the same; if the code is wrong, stop and use the right one"
         yield from filter(None, [not_on_record(results, code)])
 
 

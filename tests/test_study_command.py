@@ -17,7 +17,7 @@ from experiments.record.journal import hold_journal
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.enrolment import not_on_record
+from experiments.study.enrolment import code_prefix_of, not_on_record
 from experiments.study.new_study import new_study
 from experiments.study.register import append, entry
 from tests.at_terminal import AtTerminal
@@ -378,11 +378,21 @@ def test_a_run_says_what_the_study_asks_for_and_nobody_said(recoil: Recoil, pilo
     assert "P01: not eligible: age_years = 70: must be at most 29 (rules: " in asked(pilot)
 
 
-def test_a_run_asks_about_a_new_code_that_looks_like_one_that_is_there(recoil: Recoil, pilot: Path) -> None:
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [("P1", "P01 is there: is it the same person?"), ("X01", "the codes of this study begin with P: is it right?")],
+)
+def test_a_run_asks_about_a_new_code_that_may_be_mistyped(recoil: Recoil, pilot: Path, code: str, said: str) -> None:
     recoil("study", "pilot", "--join", "P01", *RIGHT)
-    words = warm("run", pilot / "direction.toml", "--participant", "P1", "--results", pilot / "results")
+    words = warm("run", pilot / "direction.toml", "--participant", code, "--results", pilot / "results")
     with AtTerminal(words, pilot) as sitting:
-        sitting.wait_for("recoil: participant P1 is new, and P01 is there: is it the same person?")
+        sitting.wait_for(f"recoil: participant {code} is new, and {said} The run goes on all the same; if the code is")
+
+
+def test_where_results_lie_in_no_study_nobody_asks_how_codes_begin(pilot: Path, tmp_path: Path) -> None:
+    assert code_prefix_of(pilot / "results") == "P"
+    (pilot / "study.toml").write_text("title = 1")
+    assert code_prefix_of(pilot / "results") == code_prefix_of(tmp_path / "results") == ""
 
 
 def test_a_run_says_nothing_of_facts_where_none_are_asked_for(pilot: Path) -> None:

@@ -231,7 +231,7 @@ def not_on_record(results: Path, participant_id: str) -> str:
 
     Empty if all is well, and where the results lie in no study.
     """
-    source = Path(os.path.normpath(results / ".." / STUDY_FILE))
+    source = _study_file(results)
     if not source.is_file():
         return ""
     try:
@@ -249,6 +249,18 @@ def not_on_record(results: Path, participant_id: str) -> str:
         f"participant {participant_id}: {said} (rules: {source}); the run goes on all the same; "
         f"`recoil study {results} --join {participant_id}` {then}"
     )
+
+
+def code_prefix_of(results: Path) -> str:
+    """What codes begin with in the study that results lie in; empty where there is none, or none that can be read."""
+    try:
+        return load_study(_study_file(results))[0].code_prefix
+    except ConfigError:
+        return ""
+
+
+def _study_file(results: Path) -> Path:
+    return Path(os.path.normpath(results / ".." / STUDY_FILE))
 
 
 def exclude(results: Path, participant_id: str, reason: str, clock: Clock) -> None:
