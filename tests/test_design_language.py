@@ -87,7 +87,8 @@ def asked(**keys):
         ({"factors": VOLTS, "trial": {"kind": "two-interval", "compare": "voltage_V"}}, "needs `standard`"),
         ({"factors": VOLTS, "trial": INTERVALS | {"standard": "low"}}, "is not of the kind of voltage_V's levels"),
         ({"factors": VOLTS, "trial": INTERVALS | {"kind": "oddity", "standard": 12.0}}, "nothing would differ"),
-        ({"factors": VOLTS, "trial": INTERVALS | {"catch": 3}}, "catch trials are of one interval"),
+        ({"factors": VOLTS, "trial": INTERVALS | {"catch": 3}}, "catch = 3: a catch trial is a single shot"),
+        ({"trial": {"kind": "train", "catch": 3}}, "catch = 3: a catch trial is a single shot that is left out"),
         ({"factors": ONE, "trial": {"kind": "pair", "compare": "method"}}, "makes no pair"),
         (
             {

@@ -283,9 +283,9 @@ class TrialConfig(Model):
                 f"least_exposure_s = {self.least_exposure_s:g} is longer than the longest train, max_shots = "
                 f"{self.max_shots} shots every {self.repeat_every_s:g} s ({longest_s:g} s)"
             )
-        if self.catch and several:
+        if self.catch and self.kind != "single":
             raise ValueError(
-                f"catch = {self.catch}: catch trials are of one interval; kind {self.kind!r} has {self.intervals}"
+                f"catch = {self.catch}: a catch trial is a single shot that is left out; kind {self.kind!r} has none"
             )
         return self
 
