@@ -236,7 +236,8 @@ def _open(place: Place, earlier: EarlierRun, clock: Clock, *, each: bool) -> Jou
 def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, object]:
     """What a journal says of how a run began, or went on; practices and synthetic runs name the preregistration too.
 
-    The experimenter cannot be kept from knowing the direction, as they turn the gun, and dampers, set by hand.
+    The experimenter cannot be kept from knowing the direction, as they turn the gun, and dampers, set by hand; nor, as
+    the gun is heard, whether there was a stimulus, which the screens do not tell.
     """
     setup = request.setup
     frozen = preregistration.in_force(preregistration.study_folder(request.results, setup.source))
@@ -247,14 +248,17 @@ def _circumstances(request: RunRequest, gun: Gun, clock: Clock) -> dict[str, obj
         "clock": clock.name,
         **({"sensor": request.sensor} if request.sensor else {}),
         **{name: True for name, has in request.options.named if has},
-        "experimenter_knows": ["direction", *dampers, *by_hand(setup.config), *_shown_levels(setup.config)],
+        "experimenter_knows": ["direction", *dampers, *by_hand(setup.config), *_seen_in_trials(setup.config)],
         **({"preregistration_sha256": frozen} if frozen else {}),
     }
 
 
-def _shown_levels(design: DesignConfig) -> tuple[str, ...]:
-    """The factors whose levels the experimenter is shown, once they were felt."""
-    return design.adapted if design.adaptive is not None and design.adaptive.show_level else ()
+def _seen_in_trials(design: DesignConfig) -> Iterator[str]:
+    """The factors whose levels the experimenter is shown once they were felt, and whether something was."""
+    if design.adaptive is not None and design.adaptive.show_level:
+        yield from design.adapted
+    if design.trial.has_blanks:
+        yield "stimulus"
 
 
 def _begin(

@@ -27,11 +27,22 @@ from experiments.screens.console import progress, view, widgets
 from experiments.screens.console.instructions import instruction
 from experiments.screens.console.progress import trials_done
 from experiments.screens.console.view import About, Ended, GunSeen, ParticipantSeen, Seen
-from experiments.screens.texts import ends_text, typed_rating
+from experiments.screens.texts import ends_text, track_text, typed_rating
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.remarks import EntryCorrected, Flagged, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Answered, Ask, Asking, Interrupted, Prepare, Present, Presented, Repeated, Rest
+from experiments.session.steps import (
+    Answered,
+    Ask,
+    Asking,
+    FireShot,
+    Interrupted,
+    Prepare,
+    Present,
+    Presented,
+    Repeated,
+    Rest,
+)
 from experiments.tasks.questions import choices_of
 from tests.asked import ask, describe, rate
 from tests.at_controls import DIRECTION, PREFERENCE, sat_at, tells_correctness
@@ -270,6 +281,28 @@ def test_a_gun_that_has_not_answered_for_a_while_is_not_shown_in_its_last_state(
     assert progress.gun_text(replace(asked, now_s=1.0 + view.UNANSWERED_S))[1] == "good"
     text, mood = progress.gun_text(replace(asked, now_s=5.0))
     assert (text, mood) == ("Gun: no answer for 4 s", "wait")
+
+
+@pytest.mark.parametrize("state", [State.FIRING, State.ASKING])
+def test_the_gun_gives_no_trial_away_that_has_no_stimulus(state: State) -> None:
+    detection = load_setup("detection")
+    trial = plan_of(detection).trials[0]
+    step = FireShot(trial=trial, attempt=1) if state is State.FIRING else ask(trial)
+    left_out, fired = status_of("disarmed"), replace(status_of("armed"), shots=2)
+    told = GunSeen(status=left_out, asked_s=1.0), GunSeen(status=fired, asked_s=1.0)
+    for setup, differ in ((detection, 1), (DIRECTION, 2)):
+        here = seen(setup, Position(states=(state,), step=step, since_s=2.0))
+        assert len({progress.gun_text(replace(here, gun=one)) for one in told}) == differ
+    later = [GunSeen(status=replace(left_out, shots=shots), asked_s=3.0) for shots in (1, 2)]
+    asked = seen(detection, Position(states=(State.ASKING,), step=ask(trial), since_s=2.0))
+    assert {progress.gun_text(replace(asked, gun=one)) for one in later} == {("Gun: disarmed\ncoil 20 °C", "good")}
+
+
+def test_the_count_of_a_track_gives_no_catch_trial_away() -> None:
+    trials = [replace(trial, catch=False, track=1) for trial in plan_of(DIRECTION).trials]
+    plan = replace(plan_of(DIRECTION), trials=tuple(trials))
+    assert track_text(plan, (), trials[0]).startswith("Track 1: 0 of ")
+    assert track_text(replace(plan, trials=(*trials, replace(trials[0], catch=True, track=0))), (), trials[0]) == ""
 
 
 def test_an_armed_gun_is_not_shown_armed_for_good_after_the_end() -> None:

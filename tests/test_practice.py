@@ -2,6 +2,7 @@ import csv
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -66,7 +67,16 @@ def test_an_experiment_without_a_practice_says_so(tmp_path: Path) -> None:
         practise(tmp_path, PREFERENCE)
 
 
-def test_the_journal_says_what_the_experimenter_could_know(tmp_path: Path) -> None:
-    table = practise(tmp_path)
-    head = json.loads(table.with_name("sub-P01_task-direction_practice_journal.jsonl").read_text().splitlines()[0])
-    assert head["experimenter_knows"] == ["direction", "method asymmetric-1", "method asymmetric-2"]
+@pytest.mark.parametrize(
+    ("setup", "known"),
+    [
+        (DIRECTION, ["direction", "method asymmetric-1", "method asymmetric-2"]),
+        (
+            changed("detection", practice={"repetitions": 1, "of": ("method",)}),
+            ["direction", "method asymmetric-1", "stimulus"],
+        ),
+    ],
+)
+def test_the_journal_says_what_the_experimenter_could_know(tmp_path: Path, setup: Any, known: list[str]) -> None:
+    journal = next(practise(tmp_path, setup).parent.glob("*_practice_journal.jsonl"))
+    assert json.loads(journal.read_text().splitlines()[0])["experimenter_knows"] == known

@@ -262,6 +262,11 @@ class TrialConfig(Model):
         """How many intervals a trial has."""
         return INTERVALS[self.kind]
 
+    @property
+    def has_blanks(self) -> bool:
+        """Whether there are trials, or intervals, in which nothing is fired."""
+        return self.catch > 0 or self.standard == EMPTY
+
     @model_validator(mode="after")
     def _says_what_is_compared(self) -> Self:
         several = self.intervals > 1

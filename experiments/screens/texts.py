@@ -60,8 +60,8 @@ def set_text(plan: Plan, trial: Trial) -> str:
 
 
 def track_text(plan: Plan, told: History, trial: Trial) -> str:
-    """How far the adaptive track of a trial is; empty of a trial without one."""
-    if not trial.track:
+    """How far the adaptive track of a trial is; empty without one, or beside catch trials, which have none."""
+    if not trial.track or any(other.catch for other in plan.trials):
         return ""
     own = {other for other in plan.trials if other.track == trial.track}
     return phrase(

@@ -10,7 +10,7 @@ from device import GunStatus
 from experiments.design.plan import Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
-from experiments.screens.console.view import About, Seen
+from experiments.screens.console.view import About, GunSeen, Seen
 from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
@@ -185,13 +185,18 @@ def gun_text(seen: Seen) -> tuple[str, str]:
         return phrase("Gun: not looked at any more"), "wait"
     if seen.gun_silent_s:
         return phrase("Gun: no answer for {silent_s:.0f} s", silent_s=seen.gun_silent_s), "wait"
+    blanks = seen.about.setup.config.trial.has_blanks  # nothing here gives one away: neither a count nor what is armed
+    beside = [] if blanks else [texts.shots_text(status.shots)]
+    beside.append(phrase("coil {coil_temperature_C:.0f} °C", coil_temperature_C=status.coil_temperature_C))
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
-    return phrase(
-        "Gun: {state}\n{shots} · coil {coil_temperature_C:.0f} °C",
-        state=status.state,
-        shots=texts.shots_text(status.shots),
-        coil_temperature_C=status.coil_temperature_C,
-    ), mood
+    state, mood = (phrase("one moment"), "wait") if blanks and _may_have_fired(seen, said) else (status.state, mood)
+    return phrase("Gun: {state}\n{beside}", state=state, beside=" · ".join(beside)), mood
+
+
+def _may_have_fired(seen: Seen, said: GunSeen) -> bool:
+    """Whether a shot is due, or what the gun said is of the time when one was."""
+    here = seen.position
+    return here.state is State.FIRING or (said.asked_s < here.since_s and not isinstance(here.step, steps.Prepare))
 
 
 def focus_text(seen: Seen, *, here: bool) -> tuple[str, str]:
