@@ -150,7 +150,10 @@ def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
         screen.keys.press("Return", "Control_L")
         screen.until(lambda look: look.state == "rating" and look.trial == 2)
         rated_and_half_described(screen, journal, trial=2)
+        stand_still(screen.participant_pid)
+        screen.keys.type("ft")
         screen.keys.press("F12")
+        os.kill(screen.participant_pid, signal.SIGCONT)
         screen.until(lambda look: look.state == "halted")
         screen.participant_shows("MessagePage Please wait.")
         screen.focus_on(RUN)
@@ -160,7 +163,7 @@ def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
         code, said = screen.close()
     assert code == 130, said
     assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
-    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's description: so"]
+    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's description: soft"]
     answered = [
         body["value"] for record in records(journal) if (body := record.get("body", {})).get("kind") == "answered"
     ]

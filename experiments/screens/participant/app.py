@@ -134,11 +134,11 @@ class App:
             if word is not None:
                 self._obey(word)
             self._stage.step()
+            self._tell_draft()  # before an emergency stop, behind which nobody listens to it any more
             while self._stage.unasked:
                 self._wire.say(self._stage.unasked.popleft())
             self._keys.poll()
             self._tell_keys()
-            self._tell_draft()
             self._beat()
             self._answer()
             time.sleep(_STEP_S)
