@@ -111,3 +111,9 @@ def test_the_trials_of_one_track_are_told_once():
 )
 def test_what_a_design_does_is_said(name, words):
     assert words in said(name)
+
+
+def test_of_a_practice_beside_catch_trials_it_is_said_that_it_has_none():
+    detection = changed("detection", practice={"repetitions": 2, "of": ("method",)})
+    said_of_it = " ".join(methods_section(detection.config, runs_of_groups(detection.config)))
+    assert "2 of each method could be practised first; that had no catch trials and was not analysed." in said_of_it

@@ -224,7 +224,8 @@ def _trial(design: DesignConfig, planned: PlannedRun) -> Iterator[str]:
     if design.practice.repetitions:
         each = joined_by_and([factor_words(name) for name in design.practice.of])
         how = (", with feedback" if design.practice.feedback else "") + _rounds(design)
-        yield f"{design.practice.repetitions} of each {each} could be practised first{how}; that was not analysed."
+        that = "that had no catch trials and was not analysed" if trial.catch else "that was not analysed"
+        yield f"{design.practice.repetitions} of each {each} could be practised first{how}; {that}."
 
 
 def _rounds(design: DesignConfig) -> str:
