@@ -318,6 +318,27 @@ def test_a_key_that_loses_to_what_the_experimenter_entered_is_on_record_and_said
     assert (first["response"], first["response_source"]) == ("backward", "experimenter")
 
 
+def test_a_key_for_which_their_program_stood_still_until_the_experimenter_answered_is_on_record(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=1)
+        screen.participant_shows("ChoicePage")
+        stand_still(screen.participant_pid)
+        screen.keys.press("Up")
+        screen.keys.press("b")
+        screen.until(lambda look: look.says("Saved. Trial 1: BACKWARD"))
+        os.kill(screen.participant_pid, signal.SIGCONT)
+        screen.until(lambda look: look.says("“backward” was entered at the console and taken before “forward” came:"))
+        code, said = screen.stop()
+    assert code == 130, said
+    (late,) = remarks(journal, "refused")
+    assert (late["event"], late["by"], late["answer"]) == ("participant's key", "participant", "forward")
+
+
 def onsets_s(journal: Path) -> list[float]:
     """When the shots began, on the machine's monotonic clock."""
     bodies = [record.get("body", {}) for record in records(journal)]

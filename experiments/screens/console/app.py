@@ -34,7 +34,7 @@ from experiments.screens.console.windows import (
     signals_to,
 )
 from experiments.screens.display import no_display
-from experiments.screens.participant.messages import EmergencyPressed, Unasked
+from experiments.screens.participant.messages import EmergencyPressed, Heard
 from experiments.session import events
 from experiments.session.events import Hand
 from experiments.session.remarks import Remark
@@ -110,7 +110,7 @@ class Console:
         self.window: ConsoleWindow | None = None
         self.live: LiveRun | None = None
         self.synthetic: SyntheticParticipant | None = None
-        self.heard_early: Sequence[Unasked] = ()
+        self.heard_early: Sequence[Heard] = ()
         """What is done at the participant's screen before the run listens to it."""
         self._result: Finished | None = None
         self._error: BaseException | None = None

@@ -14,6 +14,7 @@ from experiments.catalogues.fonts import font_for
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.design.plan import Trial
 from experiments.design.shown_texts import letters_of
 from experiments.live_run import LiveRun
 from experiments.run_request import RunRequest
@@ -239,6 +240,7 @@ class ParticipantSide:
             ),
             onset_s=position.since_s if paused else from_s,  # a key in a pause is no answer
             once_seen=paused or not position.asked_at_onset,  # nor one while their screen still says something else
+            step=position.number,
         )
         while wanted() and not self._keyed(step, question, position, wanted):
             question = replace(question, once_seen=True)  # it was refused: the next key counts
@@ -257,7 +259,7 @@ class ParticipantSide:
             typed=self.covered,
             timed=step.later or not given.stood_still_s,
         )
-        taken = self._offered(key, step)
+        taken = self._offered(key, step.trial)
         if taken and not key.timed:
             lost = phrase(
                 "The participant’s screen stood still for {seconds} s: the answer counts, its time does not. Close "
@@ -286,7 +288,7 @@ class ParticipantSide:
                 wanted=wanted,
             )
             event = events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand)
-            if self._offered(event, step):
+            if self._offered(event, step.trial):
                 return  # else a correction gave that rank to another one meanwhile
 
     def _taken(self, step: Rate) -> tuple[float, ...]:
@@ -305,9 +307,9 @@ class ParticipantSide:
         given = self._link.ask_description(
             messages.AskDescription(number=number, of=of, question=step.text, draft=position.number), wanted=wanted
         )
-        self._offered(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand), step)
+        self._offered(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand), step.trial)
 
-    def _offered(self, event: OwnHandEvent, step: Asking) -> bool:
+    def _offered(self, event: OwnHandEvent, trial: Trial | None) -> bool:
         """Offer what the participant did; whether it was taken. If not, the console says why.
 
         Until the next trial is answered, if another answer had been entered there: it may have to be corrected.
@@ -320,7 +322,7 @@ class ParticipantSide:
             entered = self._live.position.entered_for(event.step)
             differs = entered is not None and events.answer_said(entered) != events.answer_said(event)
             text = phrase("The participant’s answer was not taken. {text}", text=verdict.text)
-            self._tell(Trouble(text=text, trial=step.trial if differs else None))
+            self._tell(Trouble(text=text, trial=trial if differs else None))
         return verdict.taken
 
     def keep_draft(self, position: Position) -> None:
@@ -336,8 +338,11 @@ class ParticipantSide:
         if self._live is not None:
             self._live.offer(event)
 
-    def _heard(self, word: messages.Unasked) -> None:
-        """What comes from there without a question: emergency stop, whose the keys are, keys in a pause, no noise."""
+    def _heard(self, word: messages.Heard) -> None:
+        """What comes from there without a question: emergency stop, whose the keys are, keys in a pause, no noise.
+
+        Also a key for a question that the experimenter has answered: it is on record as refused.
+        """
         match word:
             case messages.EmergencyPressed():
                 self._offer(events.EmergencyStop(by="participant"))
@@ -347,6 +352,12 @@ class ParticipantSide:
                 self._draft = word
             case messages.NoiseEnded():
                 self._noise_ends(word.message)
+            case messages.ChoiceGiven() if self._live is not None and self._live.position.entered_for(word.step):
+                at_s = self._live.clock.now()
+                late = events.ParticipantKey(
+                    response=word.response, at_s=at_s, step=word.step, timed=False, by=self._hand
+                )
+                self._offered(late, None)
             case messages.KeyPressed() if self._live is not None:
                 position, now_s = self._live.position, self._live.clock.now()
                 said = self._said(position)

@@ -73,6 +73,8 @@ _STEP_S = 0.004
 """How long the program rests between two looks at words, mouse and keys."""
 _BEAT_S = 1.0
 """And between two beats, with a look whether the noise plays still."""
+_LATE_S = 0.25
+"""For so long after a question was called off its keys are heard: one that stood still has them only then."""
 
 
 def run_program(look: messages.Look, heard: BinaryIO, said: BinaryIO) -> int:
@@ -116,6 +118,8 @@ class App:
         """What was set or written and not taken, until something else is asked for."""
         self._asked_for = ("", 0)
         self._draft: messages.Draft | None = None
+        self._called_off: tuple[ChoicePage, float] | None = None
+        """A question without an answer, and when it was taken off."""
 
     def begin(self) -> None:
         """Show an empty window and say that it is ready."""
@@ -141,6 +145,7 @@ class App:
             self._tell_keys()
             self._beat()
             self._answer()
+            self._answer_late()
             time.sleep(_STEP_S)
         self._noise.stop()
         self._stage.close()
@@ -175,6 +180,8 @@ class App:
         self._told_s = self._stage.toolkit.now()
         match word:
             case messages.Show():
+                if isinstance(page := self._stage.page, ChoicePage):
+                    self._called_off = page, self._told_s
                 self._stage.put(MessagePage(self._stage, word.text), keep_keys=word.keep_keys)
             case messages.AskRating():
                 self._stage.put(RatingPage(self._stage, word, self._drafts_of(word)))
@@ -203,3 +210,13 @@ class App:
             self._wire.say(given)
             self._draft = None  # not taken in a pause, it stands there again, and is told again
             self._stage.put(MessagePage(self._stage, self._stage.look.messages.between), keep_keys=page.typed)
+
+    def _answer_late(self) -> None:
+        """Say what was pressed for a question that is called off: nobody waits for it, but it is put on record."""
+        if self._called_off is None:
+            return
+        page, since_s = self._called_off
+        if (given := page.outcome()) is not None:
+            self._wire.say(given)
+        if given is not None or self._stage.toolkit.now() - since_s > _LATE_S:
+            self._called_off = None

@@ -96,7 +96,7 @@ class ParticipantLink:
         """That the noise has ended, if it has; it may have before anybody listened."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
-        self._heard: Callable[[messages.Unasked], None] = lambda _: None
+        self._heard: Callable[[messages.Heard], None] = lambda _: None
         self._gone: Callable[[str], None] = lambda _: None
         self._beats: queue.SimpleQueue[float] = queue.SimpleQueue()
         try:
@@ -132,8 +132,8 @@ class ParticipantLink:
         self.map_clocks()
         return ready
 
-    def listen(self, heard: Callable[[messages.Unasked], None], gone: Callable[[str], None]) -> None:
-        """Have somebody told what is said without a question, and why the screen is gone if it goes."""
+    def listen(self, heard: Callable[[messages.Heard], None], gone: Callable[[str], None]) -> None:
+        """Have somebody told what is said without a question, or too late, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
         for word in (self.focused, self.noise_ended):
             if word is not None:
@@ -270,8 +270,8 @@ class ParticipantLink:
             self.focused = word if isinstance(word, messages.Focused) else self.focused
             self.noise_ended = word if isinstance(word, messages.NoiseEnded) else self.noise_ended
             self._heard(word)
-        else:
-            self._mail.put(word)
+        elif not self._mail.put(word) and isinstance(word, messages.ChoiceGiven):
+            self._heard(word)
 
     def _failed(self, why: str) -> None:
         """Nothing comes from there any more; the first reason stands, and is told once."""
@@ -313,11 +313,14 @@ class Mailbox:
         self._open: int | None = None
         self.failure: str | None = None
 
-    def put(self, word: messages.FromParticipant) -> None:
-        """Keep a word for who waits for it."""
+    def put(self, word: messages.FromParticipant) -> bool:
+        """Keep a word for who waits for it; false of a choice for which nobody waits any more."""
         with self._news:
+            if isinstance(word, messages.ChoiceGiven) and word.ask != self._open:
+                return False
             self._last[type(word)] = word
             self._news.notify_all()
+            return True
 
     @property
     def asking(self) -> bool:

@@ -90,13 +90,14 @@ class KeyedAnswer:
 class AskChoice:
     """Ask for one of several answers; a key pressed before `onset_s` is none.
 
-    `once_seen`: nor is one that was pressed before the question stood there.
+    `once_seen`: nor is one that was pressed before the question stood there. `step` names it in the answer.
     """
 
     question: str
     answers: tuple[KeyedAnswer, ...]
     onset_s: _Finite
     once_seen: bool = False
+    step: int = 0
     ask: int = 0
     kind: Literal["ask-choice"] = "ask-choice"
 
@@ -175,12 +176,13 @@ class DescriptionGiven:
 class ChoiceGiven:
     """Which answer, and when its key went down; `stood_still_s`: by how much that may be too late, as nobody looked.
 
-    Or by how much too late the question may have been seen.
+    Or by how much too late the question may have been seen. `step` is the question's.
     """
 
     response: str
     pressed_s: _Finite
     stood_still_s: _Finite = 0.0
+    step: int = 0
     ask: int = 0
     kind: Literal["choice-given"] = "choice-given"
 
@@ -246,6 +248,8 @@ class ScreenFailed:
 ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
 Unasked = EmergencyPressed | Focused | KeyPressed | Draft | NoiseEnded
 """What the participant's screen says without being asked."""
+Heard = Unasked | ChoiceGiven
+"""What nobody waits for: also an answer to a question that was called off."""
 FromParticipant = Ready | Pong | Beat | RatingGiven | DescriptionGiven | ChoiceGiven | NoiseIs | Unasked | ScreenFailed
 
 _TO: TypeAdapter[ToParticipant] = TypeAdapter(Annotated[ToParticipant, Field(discriminator="kind")])

@@ -72,7 +72,12 @@ class ChoicePage(Page):
         said = {answer.key: answer.answer for answer in self._asked.answers}
         for press in self._keys.since(self._since_s):
             if press.name in said:
-                return messages.ChoiceGiven(response=said[press.name], pressed_s=press.pressed_s, ask=self._asked.ask)
+                return messages.ChoiceGiven(
+                    response=said[press.name],
+                    pressed_s=press.pressed_s,
+                    step=self._asked.step,
+                    ask=self._asked.ask,
+                )
         return None
 
 
