@@ -449,3 +449,26 @@ def test_f12_on_the_participants_window_while_it_is_starting_halts_the_run(
         screen.keys.press("q")
         assert screen.close()[0] == 130
     assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]
+
+
+def test_f12_on_the_participants_window_while_it_is_started_again_halts_the_run(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("preparing", trial=1)
+        os.kill(screen.participant_pid, signal.SIGKILL)
+        screen.until(lambda look: look.state == "paused")
+        screen.stands(RUN)
+        screen.watch.pages.unlink()
+        screen.keys.press("s")
+        screen.focus_on(PARTICIPANT)
+        assert not screen.watch.pages.exists()  # nothing was shown there yet
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
+        screen.focus_on(RUN)
+        screen.keys.press("q")
+        assert screen.close()[0] == 130
+    assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]

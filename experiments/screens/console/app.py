@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 
@@ -34,7 +34,6 @@ from experiments.screens.console.windows import (
     signals_to,
 )
 from experiments.screens.display import no_display
-from experiments.screens.participant.messages import EmergencyPressed, Heard
 from experiments.session import events
 from experiments.session.events import Hand
 from experiments.session.remarks import Remark
@@ -110,8 +109,6 @@ class Console:
         self.window: ConsoleWindow | None = None
         self.live: LiveRun | None = None
         self.synthetic: SyntheticParticipant | None = None
-        self.heard_early: Sequence[Heard] = ()
-        """What is done at the participant's screen before the run listens to it."""
         self._result: Finished | None = None
         self._error: BaseException | None = None
         self._leaving, self._failed = "", False
@@ -253,8 +250,6 @@ class Console:
             live.offer(events.Stop(reason=self._leaving))
         if self.participant is not None:
             self.participant.begin(live, self._tell)
-        if any(isinstance(word, EmergencyPressed) for word in self.heard_early):
-            live.offer(events.EmergencyStop(by="participant"))
         threading.Thread(target=self._look_at, args=(live,), daemon=True, name="gun-look").start()
 
     def show(self, position: Position) -> None:

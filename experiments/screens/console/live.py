@@ -37,7 +37,6 @@ from experiments.screens.console.visual_participant import VisualParticipant, op
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import Heard
 from experiments.screens.phrases import phrase
 from experiments.session.states import EMERGENCY
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
@@ -64,11 +63,9 @@ def _carry_out(request: RunRequest, last: str) -> Finished:
     check_font(request)
     with ExitStack() as stack:
         rater = open_rater(stack) if request.visual and request.options.screen else None
-        early: list[Heard] = []
-        participant = _participant(stack, request, early.append) if request.options.any else None
+        participant = _participant(stack, request) if request.options.any else None
         band, said_last = _band_and_last(request, last)
         console = Console(request, clock, participant=participant, band=band, last=said_last)
-        console.heard_early = early
         if request.visual:
             stack.enter_context(VisualParticipant(console, rater))
         return console.run()
@@ -193,11 +190,8 @@ def study_of(request: RunRequest) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
-def _participant(stack: ExitStack, request: RunRequest, heard: Callable[[Heard], None]) -> ParticipantSide:
-    """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile.
-
-    `heard` is told what is done there before the run listens.
-    """
+def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
+    """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
     options, said = request.options, request.language.messages
     setup, _ = setup_in(request.language, request.setup)
     check_monitor(options.monitor)
@@ -207,7 +201,6 @@ def _participant(stack: ExitStack, request: RunRequest, heard: Callable[[Heard],
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))
-        link.listen(heard, lambda _: None)
         link.wait_ready()
         link.show(said.wait)
         return link

@@ -94,6 +94,8 @@ class ParticipantLink:
         """Whose the keys are, as far as it was said."""
         self.noise_ended: messages.NoiseEnded | None = None
         """That the noise has ended, if it has; it may have before anybody listened."""
+        self._emergency: messages.EmergencyPressed | None = None
+        """That the emergency stop was pressed, if it was: perhaps as the window opened."""
         self._stands = 0
         """The question that was put on the screen last; 0 when something else was."""
         self._heard: Callable[[messages.Heard], None] = lambda _: None
@@ -135,7 +137,7 @@ class ParticipantLink:
     def listen(self, heard: Callable[[messages.Heard], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, or too late, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
-        for word in (self.focused, self.noise_ended):
+        for word in (self.focused, self.noise_ended, self._emergency):
             if word is not None:
                 heard(word)
         if self.failure is not None:
@@ -269,6 +271,7 @@ class ParticipantLink:
         elif isinstance(word, messages.Unasked):
             self.focused = word if isinstance(word, messages.Focused) else self.focused
             self.noise_ended = word if isinstance(word, messages.NoiseEnded) else self.noise_ended
+            self._emergency = word if isinstance(word, messages.EmergencyPressed) else self._emergency
             self._heard(word)
         elif not self._mail.put(word) and isinstance(word, messages.ChoiceGiven):
             self._heard(word)
