@@ -209,6 +209,30 @@ def test_a_row_that_was_chosen_before_is_chosen_again_by_a_click(study: StudyFol
     assert window.form.code.text() == "P01"
 
 
+def test_who_comes_back_to_the_window_sees_what_was_done_meanwhile_and_finds_all_that_was_typed(
+    study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P02", records=40)
+    window = opened()
+    window.table.selectRow(0)
+    QTest.keyClicks(window.form.code_again, "P0")
+    other = QWidget()
+    other.show()
+    other.activateWindow()
+    assert QTest.qWaitForWindowActive(other, 1000 * PATIENCE_S)
+    do(study, "P01")
+    do(study, "P02")
+    assert window.table.rowCount() == 1
+    window.activateWindow()
+    assert QTest.qWaitForWindowActive(window, 1000 * PATIENCE_S)
+    shown = [[item.text() for at in range(2) if (item := window.table.item(row, at))] for row in range(2)]
+    assert shown == [["P01", "done"], ["P02", "done"]]
+    assert [item.text() for item in window.table.selectedItems()][:1] == ["P02"]
+    assert (window.form.code.text(), window.form.code_again.text()) == ("P02", "P0")
+    assert remark(window) == "P02 has done direction."
+    other.close()
+
+
 def test_to_break_the_order_of_the_study_is_said_in_words_and_a_new_code_mends_it(
     study: StudyFolder, opened: Open
 ) -> None:

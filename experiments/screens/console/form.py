@@ -230,13 +230,17 @@ class PeopleTable(QtWidgets.QTableWidget):
         self.cellClicked.connect(self._chosen)  # also the row that was chosen before
 
     def show_people(self, seen: Sequence[Participant]) -> None:
-        """Show how the participants stand."""
+        """Show how the participants stand; whoever was chosen stays so."""
+        chosen = self.item(self.currentRow(), 0) if self.selectedItems() else None
+        code = "" if chosen is None else chosen.text()
         self.blockSignals(True)
         self.setRowCount(len(seen))
         for line, person in enumerate(seen):
             cells = [person.participant_id, *map(cell_text, person.runs), note_text(person)]
             for column, text in enumerate(cells):
                 self.setItem(line, column, QtWidgets.QTableWidgetItem(text))
+            if person.participant_id == code:
+                self.selectRow(line)
         self.blockSignals(False)
         self._fit()
 

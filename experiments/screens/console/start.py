@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from PyQt6 import QtWidgets
-from PyQt6.QtCore import QEventLoop, pyqtSignal
+from PyQt6.QtCore import QEvent, QEventLoop, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 
 from device.messages import RecoilError
@@ -44,7 +44,7 @@ class StartWindow(QtWidgets.QWidget):
         self.choice: RunRequest | None = None
         self.question: QuestionBox | None = None
         self._simulation_is_known = False
-        self._closing = False
+        self._closing = self._was_left = False
         self._scale = 0.0
         self._build()
         self._fill()
@@ -173,6 +173,16 @@ class StartWindow(QtWidgets.QWidget):
         self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
         self.shots.choose(self._setup())
         self.test_button.setText(phrase("{next}  [Ctrl+T]", next=self.shots.next_text()))
+
+    def changeEvent(self, event: QEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Look again whenever somebody comes back to the window: what is typed, chosen or asked stays."""
+        super().changeEvent(event)
+        if event is None or event.type() != QEvent.Type.ActivationChange:
+            return
+        if self.isActiveWindow() and self._was_left and not self.shots.is_running:
+            self._fill()
+            self._show_choice()
+        self._was_left = not self.isActiveWindow()
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: N802 - Qt's name
         """Have the type grow with the window."""
