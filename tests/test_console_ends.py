@@ -318,7 +318,7 @@ def test_a_gun_that_does_not_answer_is_not_fired_and_once_it_answers_it_is(
         screen.stands(RUN)
         screen.to("preparing", trial=1)
         stand_still(twin.pid)
-        look = screen.until(lambda look: look.says("See to the gun first"))
+        look = screen.until(lambda look: look.says("The gun has not answered for"))
         assert not look.says("Fire\n[Space]")
         screen.keys.press("space")
         twin.send_signal(signal.SIGCONT)

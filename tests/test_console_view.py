@@ -283,6 +283,17 @@ def test_a_gun_that_has_not_answered_for_a_while_is_not_shown_in_its_last_state(
     assert (text, mood) == ("Gun: no answer for 4 s", "wait")
 
 
+def test_a_gun_that_has_not_answered_for_a_while_is_neither_handed_over_nor_fired() -> None:
+    preparing = Position(states=(State.PREPARING,), step=prepare(plan_of(DIRECTION).trials[0]))
+    here = seen(DIRECTION, preparing, gun=GunSeen(status=status_of("disarmed"), asked_s=1.0), now_s=1.0)
+    silent = replace(here, now_s=3.0)
+    assert here.gun_silence == ""
+    assert silent.gun_silence == "the gun has not answered for 2 s"
+    assert instruction(here).title.endswith("hand it over")
+    assert instruction(silent).title == "See to the gun first"
+    assert replace(silent, gun=GunSeen(status=None, asked_s=1.0, fault="no port")).gun_silence == "no port"
+
+
 @pytest.mark.parametrize("state", [State.FIRING, State.ASKING])
 def test_the_gun_gives_no_trial_away_that_has_no_stimulus(state: State) -> None:
     detection = load_setup("detection")

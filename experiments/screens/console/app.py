@@ -236,7 +236,6 @@ class Console:
                 seen = view.GunSeen(status=live.gun.status(), asked_s=asked_s)
             except DeviceError as error:
                 seen = view.GunSeen(status=None, asked_s=asked_s, fault=str(error))
-            live.gun_silence = seen.fault
             self._tell(seen)
             self._over.wait(GUN_LOOK_S)
 

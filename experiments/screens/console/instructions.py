@@ -37,7 +37,7 @@ def instruction(seen: Seen) -> Instruction:
     """What to do now."""
     if seen.ended is not None:
         return _end(seen, seen.ended)
-    if seen.position.state in (State.SETTING, State.PREPARING) and (trouble := seen.gun_trouble):
+    if seen.position.state in (State.SETTING, State.PREPARING) and (trouble := seen.gun_trouble or seen.gun_silence):
         return _see_to_the_gun(trouble)
     shown = _OF_STATE.get(seen.position.state, _MOMENT)
     return shown if isinstance(shown, Instruction) else shown(seen)

@@ -161,6 +161,15 @@ class Seen:
         return silent_s if silent_s > UNANSWERED_S else 0.0
 
     @property
+    def gun_silence(self) -> str:
+        """Why nothing may be fired: the gun does not answer, or has not for a while; empty if it does."""
+        if self.gun is None:
+            return ""
+        if self.gun.fault or not self.gun_silent_s:
+            return self.gun.fault
+        return phrase("the gun has not answered for {silent_s:.0f} s", silent_s=self.gun_silent_s)
+
+    @property
     def participant_gone(self) -> bool:
         """Whether there was a participant's screen, and is none now."""
         return self.participant is not None and bool(self.participant.failure)

@@ -278,6 +278,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if self.controls is not None:
             self.controls.tick(here=self.isActiveWindow())
         seen = self.seen
+        if self.live is not None:
+            self.live.gun_silence = seen.gun_silence
         self.notice.put(instruction(seen))
         self.place.setText(view.where_text(seen))
         self._show_bands(seen)
