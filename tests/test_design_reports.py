@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pingouin
 import pytest
+from matplotlib.collections import PathCollection
 from scipy import stats
 
 from analysis.report import apa
@@ -473,20 +474,44 @@ def test_a_figure_of_hits_has_the_false_alarms_beside_them(varied, tmp_path, mon
     monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
     figure_design(found, tmp_path / "figure")
     (axes,) = drawn[0].axes
-    handles, names = axes.get_legend_handles_labels()
-    lines = {name: line for name, line in zip(names, handles, strict=True) if "false alarms" in name}
-    shares = {"false alarms, one": 1 / 12, "false alarms, two": 2 / 12} if varied else {"false alarms": 3 / 24}
-    assert {name: line.get_ydata()[0] / 100 for name, line in lines.items()} == pytest.approx(shares)
-    hits = {name: bars.lines[0] for name, bars in zip(names, handles, strict=True) if name not in lines}
-    looks = {name: (line.get_color(), line.get_marker()) for name, line in (hits | lines).items()}
-    assert len(set(looks.values())) == len(hits)
-    for name, line in lines.items():  # each as its hits, but that its mark is hollow
-        assert looks[name] == looks[name.replace("false alarms", "hits")]
-        assert line.get_markerfacecolor() == "white"
+    ticks = [(at, text.get_text()) for at, text in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)]
+    assert [text for _, text in ticks] == ["none:\nfalse\nalarms", "6", "10"]
+    bars = [bars.lines[0] for bars in axes.containers]
+    alarms, hits = (
+        [line for line in bars if (line.get_markerfacecolor() == "white") is hollow] for hollow in (True, False)
+    )
+    shares = {"one": 1 / 12, "two": 2 / 12} if varied else {"": 3 / 24}
+    assert [line.get_ydata()[0] / 100 for line in alarms] == pytest.approx([*shares.values()])
+    assert all(line.get_xdata()[0] < axes.spines["bottom"].get_bounds()[0] < 6.0 for line in alarms)
+    assert [line.get_xdata()[0] for line in alarms] == pytest.approx([ticks[0][0]] * len(alarms), abs=0.05)
+    looks = [[(line.get_color(), line.get_marker()) for line in lines] for lines in (alarms, hits)]
+    assert looks[0] == looks[1]  # each as its hits
+    assert axes.get_legend_handles_labels()[1] == [name for name in shares if name]
     assert axes.get_ylabel() == "hits and false alarms [%]"
     (picture,) = section_of(found).pictures
-    assert "Drawn is the share of hits and of false alarms in catch trials (felt)." in picture.caption
-    assert all(f"{name}, catch trials {apa.percent(share)}" in picture.alt for name, share in shares.items())
+    assert "Drawn is the share of hits and, hollow, of false alarms in catch trials (felt)." in picture.caption
+    said = {name or "alarms": share for name, share in shares.items()}
+    assert all(f"{name}, catch trials {apa.percent(share)}" in picture.alt for name, share in said.items())
+
+
+@pytest.mark.slow
+def test_many_conditions_have_a_panel_for_each_level_of_a_factor_and_one_scale(tmp_path, monkeypatch):
+    factors = {name: {"levels": ["one", "two"]} for name in ("grip", "coat")} | {"method": {"levels": ["a", "b"]}}
+    rating = {"kind": "rating", "text": "?", "minimum": 0, "maximum": 10, "grain": 1}
+    levels = [(8.0, 10.0, 12.0), ("one", "two"), ("one", "two"), ("a", "b")]
+    table = pd.DataFrame([*itertools.product(["P1"], *levels)], columns=["participant_id", "voltage_V", *factors])
+    table["q"] = range(len(table))
+    several = {"voltage_V": {"levels": [8.0, 10.0, 12.0]}, **factors}
+    found = summarise(design(factors=several, questions={"q": rating}), table)
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(found, tmp_path / "figure")
+    panels = drawn[0].axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["q, one", "q, two"]
+    assert panels[0].get_ylim() == panels[1].get_ylim()
+    for axes in panels:
+        assert axes.get_legend_handles_labels()[1] == ["one, a", "one, b", "two, a", "two, b"]
+        assert axes.get_legend().get_title().get_text() == "coat, method"
 
 
 @pytest.mark.slow
@@ -497,8 +522,11 @@ def test_a_figure_of_functions_of_yes_has_the_false_alarms(tmp_path, monkeypatch
     drawn = []
     monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
     figure_functions(found, found.questions["felt"].thresholds, tmp_path / "figure")
+    assert [text.get_text() for text in drawn[0].axes[0].get_xticklabels()] == ["none", "6", "8", "10"]
     for axes, share in zip(drawn[0].axes, (9 / 24, 3 / 12, 6 / 12), strict=True):
-        assert 100 * share in [line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1]
+        (marks,) = [some for some in axes.collections if isinstance(some, PathCollection)]
+        assert marks.get_offsets()[0].tolist() == pytest.approx([axes.get_xticks()[0], 100 * share])
+        assert marks.get_facecolors().sum(axis=1)[0] == 4.0  # white
     (section,) = threshold_sections("test", found)
-    assert "Straight across: false alarms in catch trials." in section.pictures[0].caption
+    assert "Hollow, in one size, at none: false alarms in catch trials." in section.pictures[0].caption
     assert section.pictures[0].alt.endswith(". False alarms: 37.5 %.")

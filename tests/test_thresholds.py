@@ -399,10 +399,11 @@ def test_in_figures_of_functions_and_tracks_nothing_that_is_written_touches(
             replace(one, condition=(("method", method),)) for one in tracks.tracks for method in METHODS[:methods]
         ]
         figure_tracks(summary, replace(tracks, tracks=tuple(of_each)), tmp_path / "never")
-    for figure in shown:
+    for figure, chance in zip(shown, (["chance"], []), strict=True):
         assert figure_files.touching(figure) == []
         legends = [legend.get_window_extent() for legend in figure.legends]
-        assert len(legends) == methods - 1
+        told = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        assert told == [*chance, *([] if methods == 1 else names)]
         assert all(0 <= box.x0 < box.x1 <= figure.bbox.width for box in legends)
 
 
@@ -437,8 +438,8 @@ def test_few_levels_have_each_a_tick_below_their_functions(monkeypatch: pytest.M
     with figure_files.full_size():
         figure_functions(summary, found, tmp_path / "never")
         lowest = [axes for axes in shown[0].axes if axes.get_visible()][-1]
-        assert [tick.get_text() for tick in lowest.get_xticklabels()] == ["0.003", "0.004", "0.005"]
-        assert lowest.get_xticks().tolist() == [0.003, 0.004, 0.005]
+        assert [tick.get_text() for tick in lowest.get_xticklabels()] == ["none", "0.003", "0.004", "0.005"]
+        assert lowest.get_xticks().tolist() == pytest.approx([0.0023, 0.003, 0.004, 0.005])
         assert figure_files.touching(shown[0]) == []
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -17,8 +17,9 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter
+from matplotlib.ticker import FixedFormatter, MaxNLocator
 
 from analysis.report.copies import in_copy
 from analysis.report.figures.glyphs import OWN_FONT, drawable_text, give_fonts, is_drawable
@@ -82,6 +83,34 @@ def have_room(levels: Sequence[float]) -> bool:
         (after - before) * across_in > _DIGIT_IN * ((len(f"{before:g}") + len(f"{after:g}")) / 2 + 1)
         for before, after in pairwise(levels)
     )
+
+
+def even_ticks(levels: Sequence[float], most: int) -> list[float]:
+    """At the most about so many even numbers from the first to the last level.
+
+    >>> even_ticks([4.3, 5.0, 20.0], 4)
+    [8.0, 12.0, 16.0, 20.0]
+    """
+    return [
+        float(tick)
+        for tick in MaxNLocator(most).tick_values(*levels[:: len(levels) - 1])
+        if levels[0] <= tick <= levels[-1]
+    ]
+
+
+_LEFT = 0.35
+"""So far left of the lowest level, as a share of all, trials without one stand: their tick has room there."""
+
+
+def left_of(levels: Collection[float]) -> float:
+    """Where trials stand that have no level along an axis of numbers."""
+    return min(levels) - _LEFT * (max(levels) - min(levels))
+
+
+def part_left(axes: Axes, levels: Collection[float]) -> None:
+    """End the line below an axis at the levels, so that what stands left of them is none."""
+    span = max(levels) - min(levels)
+    axes.spines["bottom"].set_bounds(min(levels) - 0.1 * span, max(levels) + 0.07 * span)
 
 
 def panel_grid(figure: Figure, titles: Sequence[str], across: int) -> list[Axes]:
@@ -333,27 +362,9 @@ def bounded(axes: Axes, high: float) -> None:
     axes.spines["left"].set_bounds(0.0, high)
 
 
-def level_line(axes: Axes, height: float, i: int, of: int, label: str | None = None) -> None:
-    """A dotted line across in the colour of the method at place `i`, with its mark, hollow, apart from others."""
-    axes.plot(
-        [0.0, (i + 0.5) / of, 1.0],
-        [height] * 3,
-        color=method_colour(i),
-        linestyle=":",
-        linewidth=1.2,
-        marker=method_marker(i),
-        markevery=[1],
-        markersize=5.0,
-        mfc="white",
-        label=label,
-        transform=axes.get_yaxis_transform(),
-        zorder=3.5,
-    )
-
-
-def reference_line(axes: Axes, height: float, text: str) -> None:
+def reference_line(axes: Axes, height: float, text: str) -> Line2D:
     """A dashed line across, named at its right."""
-    axes.axhline(height, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    line = axes.axhline(height, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
     axes.annotate(
         text,
         xy=(1.0, height),
@@ -365,6 +376,7 @@ def reference_line(axes: Axes, height: float, text: str) -> None:
         fontsize=7.5,
         color="#444444",
     )
+    return line
 
 
 def stars(p: float) -> str:

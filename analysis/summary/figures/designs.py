@@ -1,4 +1,7 @@
-"""What each question of a design gave: curves over a factor of numbers, else marks by level; a panel a question."""
+"""What each question of a design gave: curves over a factor of numbers, else marks by level; a panel a question.
+
+Where more series than `_MOST_SERIES` would lie on one another, it has a panel for each level of another factor.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -16,14 +20,14 @@ from analysis.report.figures.style import (
     MANY_METHODS,
     drawn,
     drawn_name,
+    even_ticks,
+    left_of,
     legend_columns,
-    level_line,
     light_grid,
-    method_colour,
-    method_line,
-    method_marker,
+    method_look,
     name_ticks,
     names_at,
+    part_left,
     reference_line,
     width_for,
 )
@@ -35,6 +39,11 @@ from experiments.design.methods_section import factor_words
 
 _ACROSS = 2
 _HITS, _ALARMS = "hits", "false alarms"
+_NONE = f"none: {_ALARMS}"
+"""The tick of catch trials, left of the levels, where they have none of these."""
+_UNJOINED = {"linestyle": "none"}
+_HOLLOW = {"linestyle": "none", "mfc": "white"}
+_MOST_SERIES = 4
 _LEGEND_COLUMNS = 3
 _TICKS = 10
 """So many levels have a tick each."""
@@ -61,19 +70,54 @@ class MeanMark:
 
 
 def figure_design(found: DesignSummary, path_stem: Path) -> None:
-    """A panel for each question; PNG, SVG and PDF are written. `ValueError` if no question has a condition."""
+    """A panel or more for each question; PNG, SVG and PDF are written. `ValueError` if no question has a condition."""
     shown = {name: question for name, question in found.questions.items() if question.drawn}
     if not shown:
         raise ValueError("the figure of a design needs a question with an answer")
-    panel = max(map(_panel_width, shown.values()))
-    columns = min(_ACROSS, len(shown), int(width_for(99) / panel))
-    rows = -(-len(shown) // columns)
-    with drawn(path_stem, 0.8 + panel * columns, 0.4 + 3.6 * rows) as figure:
+    panels = [panel for name, question in shown.items() for panel in _panels(name, question, found)]
+    width = max(_panel_width(panel.question) for panel in panels)
+    columns = min(_ACROSS, len(panels), int(width_for(99) / width))
+    rows = -(-len(panels) // columns)
+    with drawn(path_stem, 0.8 + width * columns, 0.4 + 3.6 * rows) as figure:
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for spare in grid[len(shown) :]:
+        first: dict[str, Axes] = {}
+        for spare in grid[len(panels) :]:
             spare.set_visible(False)
-        for axes, (name, question) in zip(grid, shown.items(), strict=False):
-            _draw(axes, name, question, found)
+        for axes, panel in zip(grid, panels, strict=False):
+            if first.setdefault(panel.name, axes) is not axes:
+                axes.sharey(first[panel.name])
+            _draw(axes, panel.name, panel.question, found)
+            axes.set_title(panel.title, loc="left", fontweight="bold", parse_math=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Panel:
+    """A question, called `name`, or its conditions of one level, which they are without; and what stands above it."""
+
+    name: str
+    title: str
+    question: QuestionSummary
+
+
+def _panels(name: str, question: QuestionSummary, found: DesignSummary, title: str = "") -> Iterator[_Panel]:
+    """One, or where there are too many series one for each level of the first factor that is not along the axis."""
+    if question.preferred:
+        question = replace(question, cells=question.preferred)
+    title = title or name
+    across = _across(question)
+    others = [factor for factor in _factors(question) if factor != across]
+    series = {tuple(cell.levels.get(factor) for factor in others) for cell in question.pictured}
+    if len(others) < 2 or len(series) <= _MOST_SERIES:
+        yield _Panel(name=name, title=title, question=question)
+        return
+    by = others[0]
+    for level in dict.fromkeys(cell.levels[by] for cell in question.pictured if by in cell.levels):
+        own = [cell for cell in question.cells if cell.levels.get(by, level) == level]
+        cells = [
+            replace(cell, levels={factor: of for factor, of in cell.levels.items() if factor != by}) for cell in own
+        ]
+        part = replace(question, cells=tuple(cells), preferred=None)
+        yield from _panels(name, part, found, f"{title}, {drawn_name(found.label(by, level))}")
 
 
 def _panel_width(question: QuestionSummary) -> float:
@@ -97,40 +141,41 @@ def _factors(question: QuestionSummary) -> list[str]:
 
 def _draw(axes: Axes, name: str, question: QuestionSummary, found: DesignSummary) -> None:
     light_grid(axes)
-    if question.preferred:
-        question = replace(question, cells=question.preferred)
     factor = _across(question)
     cells = [cell for cell in question.pictured if factor is None or factor in cell.levels]
-    places = _places([cell.levels[factor] for cell in cells] if factor is not None else ["all"])
-    numeric = all(isinstance(level, float) for level in places)
     alarms = question.false_alarms
     aside = [cell for cell in alarms if factor is None or factor in cell.levels]
-    series = _series(cells, factor, found, _HITS if alarms else "")
-    series |= _series(aside, factor, found, _ALARMS)
+    apart = () if aside else alarms  # catch trials that have no level along the axis
+    levels = [cell.levels[factor] if factor is not None else "all" for cell in cells]
+    places = _places([None, *levels] if apart else levels)
+    numeric = all(isinstance(level, float) for level in places if level is not None)
+    hits = _series(cells, factor, found, _HITS if aside else "") | _series(aside, factor, found, _ALARMS)
     logarithmic = question.kind == "number" and numeric and min(places.values()) > 0
-    for i, (label, some) in enumerate(series.items()):
+    series = [(label, some, {} if numeric else _UNJOINED) for label, some in hits.items()]
+    series += [(label, some, _HOLLOW) for label, some in _series(apart, factor, found, "").items()]
+    labels = [*dict.fromkeys(label for label, _, _ in series)]
+    for label, some, look in series:
+        i = labels.index(label)
+        off = i - (len(labels) - 1) / 2  # marks and bars of several series would hide each other
         marks = sorted(_marks(question, some, factor, places), key=lambda mark: mark.x)
-        off = i - (len(series) - 1) / 2  # marks and bars of several series would hide each other
         shifted = [replace(mark, x=_shifted(mark.x, off, [*places.values()], numeric, logarithmic)) for mark in marks]
-        _draw_series(axes, shifted, i, label, joined=numeric)
-    across = [] if aside else alarms  # catch trials that have no level along the axis
-    marked = [label.replace(_HITS, _ALARMS, 1) for label in series]  # the marks of whose hits are drawn
-    for i, (label, (cell,)) in enumerate(_series(across, factor, found, _ALARMS).items(), start=len(series)):
-        share, place = 100 * (cell.right or 0) / cell.trials, marked.index(label) if label in marked else i
-        level_line(axes, share, place, len(series) + len(across), label)
+        told = {"label": label} if hits.get(label, some) is some else {}  # once
+        _draw_series(axes, shifted, **method_look(i) | look | told)
     if question.kind == "number":
         _logarithmic(axes, both=logarithmic)
-    labels = found.labels.get(factor or "", {})
-    names = [labels.get(shown_level(level), shown_level(level)) for level in places]  # the axis has the unit
     _label(axes, name, question, factor)
-    _tick(axes, question, places, names)
+    called = found.labels.get(factor or "", {})  # the axis has the unit
+    codes = [_NONE if level is None else shown_level(level) for level in places]
+    _tick(axes, question, places, [called.get(code, code) for code in codes])
 
 
-def _places(levels: Sequence[Level]) -> dict[Level, float]:
-    """Where each level stands: numbers at their value, words one after the other."""
+def _places(levels: Sequence[Level | None]) -> dict[Level | None, float]:
+    """Where each level stands: numbers at their value, words one after the other; `None`, without any, left of all."""
     there = list(dict.fromkeys(levels))
-    if len(there) > 1 and all(isinstance(level, float) for level in there):
-        return {level: float(str(level)) for level in sorted(there, key=lambda level: float(str(level)))}
+    numbers = sorted(level for level in there if isinstance(level, float))
+    if len(numbers) > 1 and len(numbers) == len({*there} - {None}):
+        left: dict[Level | None, float] = {None: left_of(numbers)} if None in there else {}
+        return left | {level: level for level in numbers}
     return {level: float(place) for place, level in enumerate(there)}
 
 
@@ -146,12 +191,15 @@ def _series(
 
 
 def _marks(
-    question: QuestionSummary, cells: Sequence[ConditionSummary], factor: str | None, places: Mapping[Level, float]
+    question: QuestionSummary,
+    cells: Sequence[ConditionSummary],
+    factor: str | None,
+    places: Mapping[Level | None, float],
 ) -> Iterator[MeanMark]:
     for cell in cells:
         if cell.mean is None:
             continue
-        x, spread = places[cell.levels[factor] if factor is not None else "all"], cell.sd or 0.0
+        x, spread = places[cell.levels.get(factor) if factor is not None else "all"], cell.sd or 0.0
         if cell.ci_low is not None and cell.ci_high is not None and cell.right is not None:
             share = cell.right / cell.trials
             yield MeanMark(x=x, mean=100 * share, low=100 * cell.ci_low, high=100 * cell.ci_high)
@@ -172,21 +220,17 @@ def _shifted(x: float, aside: float, places: Sequence[float], numeric: bool, log
     return x * (high / low) ** (_ASIDE * aside) if logarithmic else x + _ASIDE * (high - low) * aside
 
 
-def _draw_series(axes: Axes, marks: Sequence[MeanMark], i: int, label: str, *, joined: bool) -> None:
-    if not marks:
-        return
-    axes.errorbar(
-        [mark.x for mark in marks],
-        [mark.mean for mark in marks],
-        yerr=[[mark.mean - mark.low for mark in marks], [mark.high - mark.mean for mark in marks]],
-        color=method_colour(i),
-        marker=method_marker(i),
-        markersize=5.0,
-        linestyle=method_line(i) if joined else "none",
-        capsize=2.5,
-        linewidth=1.2,
-        label=label or None,
-    )
+def _draw_series(axes: Axes, marks: Sequence[MeanMark], **look: Any) -> None:
+    if marks:
+        axes.errorbar(
+            [mark.x for mark in marks],
+            [mark.mean for mark in marks],
+            yerr=[[mark.mean - mark.low for mark in marks], [mark.high - mark.mean for mark in marks]],
+            markersize=5.0,
+            capsize=2.5,
+            linewidth=1.2,
+            **look,
+        )
 
 
 def _logarithmic(axes: Axes, *, both: bool) -> None:
@@ -222,7 +266,6 @@ def _label(axes: Axes, name: str, question: QuestionSummary, factor: str | None)
     share = f"share of {drawn_name(label if is_drawable(label) else counted)} [%]" if counted else f"{of} [%]"
     axes.set_ylabel(share if question.kind in ("choice", "yes-no") else _with_scale(name, question))
     axes.set_xlabel(factor_words(factor) if factor else "")
-    axes.set_title(name, loc="left", fontweight="bold", parse_math=False)
     if scored and question.chance is not None and question.kind == "choice":
         reference_line(axes, 100.0 * question.chance, "chance")
     if question.kind in ("choice", "yes-no"):
@@ -238,13 +281,20 @@ def _with_scale(name: str, question: QuestionSummary) -> str:
     return f"{name}{apart}{scale}".replace("$", r"\$")  # which begins no formula here
 
 
-def _tick(axes: Axes, question: QuestionSummary, places: Mapping[Level, float], names: Sequence[str]) -> None:
-    """A tick with its name for each level, or of many numbers as matplotlib has them; then the legend."""
-    if len(places) == 1 or any(isinstance(level, str) for level in places):
+def _tick(axes: Axes, question: QuestionSummary, places: Mapping[Level | None, float], names: Sequence[str]) -> None:
+    """A tick with its name for each level, or of many numbers at some; then the legend."""
+    levels = [level for level in places if level is not None]
+    if None in places:
+        part_left(axes, [places[level] for level in levels])
+    numbers = [level for level in levels if isinstance(level, float)]
+    if len(levels) == 1 or numbers != levels:
         name_ticks(axes, names, room_in=_panel_width(question))
-    elif len(places) <= _TICKS:
+    elif len(levels) <= _TICKS:
         names_at(axes, [*places.values()], names)
         axes.xaxis.minorticks_off()
+    elif None in places:
+        some = even_ticks(numbers, _TICKS)
+        names_at(axes, [places[None], *some], [_NONE, *(f"{at:g}" for at in some)])
     _add_legend(axes, question)
 
 

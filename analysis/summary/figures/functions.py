@@ -9,22 +9,24 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from analysis.psychometric.fit import Credible
 from analysis.psychometric.people import PersonFit, ShareAtLevel, mean_curve
 from analysis.report.figures.style import (
+    GREY,
     drawn,
     drawn_name,
+    even_ticks,
     have_room,
+    left_of,
     legend_below,
-    level_line,
     light_grid,
     method_colour,
     method_line,
     method_look,
     method_marker,
     panel_grid,
+    part_left,
     reference_line,
 )
 from analysis.stats.arrays import FloatArray
@@ -53,13 +55,13 @@ _LABELS = {"right": "right [%]", "yes": "yes [%]", "chosen": "chosen over the st
 class _Curve:
     """What one panel shows of one condition: points, a curve with its band, a threshold with its interval.
 
-    `alarms`: the share of yes in catch trials.
+    `caught`: how often yes was said in catch trials, and their number.
     """
 
     points: tuple[ShareAtLevel, ...]
     shares: tuple[FloatArray, FloatArray, FloatArray] | None
     threshold: Credible | None
-    alarms: float | None
+    caught: tuple[int, int] | None
 
 
 def figure_functions(found: DesignSummary, of: Thresholds, path_stem: Path) -> None:
@@ -88,15 +90,15 @@ def _own(condition: ConditionFit, who: str, levels: FloatArray) -> _Curve:
     one = next((one for one in condition.people if one.participant == who), None)
     if one is None or one.fit is None:
         points = () if one is None else one.points
-        return _Curve(points=points, shares=None, threshold=None, alarms=alarm_share([one] if one else []))
+        return _Curve(points=points, shares=None, threshold=None, caught=caught_of([one] if one else []))
     within = one.fit.threshold if one.fit.where == "within" else None
-    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within, alarms=alarm_share([one]))
+    return _Curve(points=one.points, shares=one.fit.curve(levels), threshold=within, caught=caught_of([one]))
 
 
-def alarm_share(people: Sequence[PersonFit]) -> float | None:
-    """The share of yes in all their catch trials; `None` without any."""
+def caught_of(people: Sequence[PersonFit]) -> tuple[int, int] | None:
+    """How often they said yes in all their catch trials, and the number of these; `None` without any."""
     caught = [one.catch for one in people if one.catch is not None]
-    return sum(yes for yes, _ in caught) / sum(trials for _, trials in caught) if caught else None
+    return (sum(yes for yes, _ in caught), sum(trials for _, trials in caught)) if caught else None
 
 
 def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
@@ -107,31 +109,28 @@ def _of_all(condition: ConditionFit, levels: FloatArray) -> _Curve:
         points=condition.points,
         shares=mean_curve(fits, levels) if fits else None,
         threshold=None if group is None else group.threshold,
-        alarms=alarm_share(condition.people),
+        caught=caught_of(condition.people),
     )
 
 
 def _draw(axes: Axes, curves: Sequence[_Curve], levels: FloatArray) -> None:
     light_grid(axes)
     apart = (levels[-1] - levels[0]) * min(_ASIDE, _ALL_ASIDE / max(1, len(curves) - 1))
-    alarms: dict[float, list[int]] = {}
-    for i, curve in enumerate(curves):
-        if curve.alarms is not None:
-            alarms.setdefault(curve.alarms, []).append(i)
-    for share, (i, *others) in alarms.items():  # grey where it is of several curves, or of all
-        if len(alarms) == 1 or others:
-            reference_line(axes, 100 * share, "")
-        else:
-            level_line(axes, 100 * share, i, len(curves))
     for i, curve in enumerate(curves):
         colour, aside = method_colour(i), apart * (i - (len(curves) - 1) / 2)  # marks of several would hide each other
         if curve.shares is not None:
             middle, low, high = (100 * share for share in curve.shares)
             axes.fill_between(levels, low, high, color=colour, alpha=0.15, linewidth=0)
             axes.plot(levels, middle, color=colour, linestyle=method_line(i), linewidth=1.3)
-        _draw_points(axes, neighbours_joined(curve.points), i, aside)
+        points = neighbours_joined(curve.points)
+        if curve.caught is not None:
+            yes, trials = curve.caught
+            points.insert(0, ShareAtLevel(level=left_of(levels), right=yes, trials=trials))
+        _draw_points(axes, points, i, aside, lowest=levels[0])
         if curve.threshold is not None:
             _draw_threshold(axes, curve.threshold, i, alone=len(curves) == 1)
+    if any(curve.caught is not None for curve in curves):
+        part_left(axes, levels)
 
 
 def _draw_threshold(axes: Axes, found: Credible, i: int, *, alone: bool) -> None:
@@ -144,11 +143,12 @@ def _draw_threshold(axes: Axes, found: Credible, i: int, *, alone: bool) -> None
         axes.plot([found.median], [foot], method_marker(i), color=colour, markersize=5.5, mec="white", mew=0.5)
 
 
-def _draw_points(axes: Axes, points: Sequence[ShareAtLevel], i: int, aside: float) -> None:
+def _draw_points(axes: Axes, points: Sequence[ShareAtLevel], i: int, aside: float, *, lowest: float) -> None:
+    """Hollow and of one size where they are below the lowest level: of catch trials."""
     if not points:
         return
-    at, right, trials = (np.array([getattr(one, name) for one in points]) for name in ("level", "right", "trials"))
-    at = at + aside
+    level, right, trials = (np.array([getattr(one, name) for one in points]) for name in ("level", "right", "trials"))
+    at, hollow = level + aside, level < lowest
     exact = binomial_test(right, trials)
     axes.vlines(
         at, 100 * np.asarray(exact.ci_low), 100 * np.asarray(exact.ci_high), color=method_colour(i), linewidth=0.8
@@ -156,12 +156,13 @@ def _draw_points(axes: Axes, points: Sequence[ShareAtLevel], i: int, aside: floa
     axes.scatter(
         at,
         100 * right / trials,
-        s=np.maximum(_AREA * trials / trials.max(), 6.0) * 0.5,
+        s=np.where(hollow, 0.5 * _AREA, np.maximum(_AREA * trials / trials[~hollow].max(initial=1), 6.0) * 0.5),
         marker=method_marker(i),
-        color=method_colour(i),
-        edgecolors="white",
-        linewidths=0.4,
+        color=np.where(hollow, "white", method_colour(i)).tolist(),
+        edgecolors=np.where(hollow, method_colour(i), "white").tolist(),
+        linewidths=np.where(hollow, 1.1, 0.4).tolist(),
         zorder=3.0,
+        clip_on=False,
     )
 
 
@@ -195,23 +196,24 @@ def drawn_condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
 
 
 def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thresholds) -> None:
-    if of.guess is not None:
-        for axes in grid:
-            reference_line(axes, 100 * of.guess, "")
-    if of.share == "chosen" and isinstance(of.standard, float):
-        for axes in grid:
-            axes.axvline(of.standard, color="#666666", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    for axes in grid:
+        if of.guess is not None:
+            reference_line(axes, 100 * of.guess, "").set_label("chance")
+        if of.share == "chosen" and isinstance(of.standard, float):
+            line = axes.axvline(of.standard, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+            line.set_label("standard")
     grid[0].set_ylim(-3.0, 103.0)
     levels = sorted({point.level for condition in of.conditions for point in condition.points})
-    if have_room(levels):
-        grid[0].set_xticks(levels, [f"{level:g}" for level in levels])
-    else:
-        grid[0].xaxis.set_major_locator(MaxNLocator(4))
+    ticks = {level: f"{level:g}" for level in (levels if have_room(levels) else even_ticks(levels, 4))}
+    if any(one.catch is not None for condition in of.conditions for one in condition.people):
+        ticks = {left_of(levels): "none", **ticks}
+    grid[0].set_xticks([*ticks], [*ticks.values()])
     figure.supylabel(_LABELS[of.share], fontsize=9.0)
     if len(of.conditions) > 1:
         for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
             name = drawn_condition(found, condition.levels)
             grid[0].plot([], [], **method_look(i), markersize=4.5, linewidth=1.3, label=name)
+    if grid[0].get_legend_handles_labels()[1]:
         legend_below(figure, grid[0], 3, factor_words(of.factor))
     else:
         figure.supxlabel(factor_words(of.factor), fontsize=9.0)

@@ -274,7 +274,7 @@ def _drawn_words(question: QuestionSummary) -> str:
     """What a picture's marks count, where its axis does not say it; else empty."""
     tie = _tie(question)
     if question.false_alarms:
-        return "the share of hits and of false alarms in catch trials"
+        return "the share of hits and, hollow, of false alarms in catch trials"
     if question.counted:
         return f"the share of {question.label(question.counted)}"
     return f"how often each was chosen{tie}" if tie else ""

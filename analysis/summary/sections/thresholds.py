@@ -10,7 +10,7 @@ from analysis.psychometric.people import FEWEST_ANSWERS, GroupFit, PersonFit
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Picture, Section, Table
-from analysis.summary.figures.functions import MOST_PANELS, alarm_share
+from analysis.summary.figures.functions import MOST_PANELS, caught_of
 from analysis.summary.figures.tracks import MOST_TRACK_PANELS
 from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
@@ -208,11 +208,11 @@ def _picture(name: str, asked: str, found: DesignSummary, of: Thresholds) -> Pic
     more = len(people) - MOST_PANELS
     rest = f" {more:,} more people have no panel; their numbers are in the table." if more > 0 else ""
     alarms = [
-        f"{_condition(found, one.levels)}{apa.percent(share)}"
+        f"{_condition(found, one.levels)}{apa.percent(caught[0] / caught[1])}"
         for one in of.conditions[:_TOLD]
-        if (share := alarm_share(one.people)) is not None
+        if (caught := caught_of(one.people)) is not None
     ]
-    unknown = "Straight across: false alarms in catch trials" if alarms else ""
+    unknown = "Hollow, in one size, at none: false alarms in catch trials" if alarms else ""
     chosen = of.share == "chosen" and isinstance(of.standard, float)
     line = "Dashed: the standard" if chosen else "Dashed: chance" if of.guess is not None else unknown
     group = "first all people with the mean of their curves, then " if len(people) > 1 else ""
