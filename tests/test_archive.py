@@ -215,7 +215,7 @@ def test_a_redacted_journal_follows_from_its_own_lines_and_names_the_original(
         }
         assert len(raw(path)) == len(lines)
         if read_journal(path).finished:
-            of_table, itself = ending_of(path.read_bytes())
+            of_table, itself, _ = ending_of(path.read_bytes())
             assert of_table
             assert itself
             assert head["plan_sha256"] == raw(original)[0]["plan_sha256"]

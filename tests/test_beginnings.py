@@ -86,20 +86,22 @@ def test_an_experiment_breaks_the_order_if_an_earlier_one_is_not_done() -> None:
     assert passed_over(someone("done", "not begun"), "preference", ORDER) == []
 
 
-def at(*ended: str) -> Participant:
-    """Somebody who is done with everything, each at its time."""
+def at(*began: str) -> Participant:
+    """Somebody who is done with everything, each begun at its time and an hour long."""
     person = someone("done", "done")
-    return replace(person, runs=tuple(replace(run, last_utc=utc) for run, utc in zip(person.runs, ended, strict=True)))
+    hours = ((f"2026-11-28T{hour}:00:00Z", f"2026-11-28T{int(hour) + 1}:00:00Z") for hour in began)
+    runs = zip(person.runs, hours, strict=True)
+    return replace(person, runs=tuple(replace(run, began_utc=first, last_utc=last) for run, (first, last) in runs))
 
 
 def test_runs_that_were_done_in_another_order_than_the_studys_are_named() -> None:
     broken = ("preference was begun before direction was done",)
     for first in ("not begun", "in progress", "synthetic"):
         assert order_broken(someone(first, "done")) == order_broken(someone(first, "in progress")) == broken
-    assert order_broken(at("2026-11-28T10:00:00Z", "2026-11-28T09:00:00Z")) == broken
+    assert order_broken(at("12", "10")) == order_broken(at("12", "12")) == broken
     for kept in (someone("done", "open elsewhere"), someone("in progress", "synthetic"), someone("done", "not begun")):
         assert order_broken(kept) == ()
-    assert order_broken(at("2026-11-28T10:00:00Z", "2026-11-28T11:00:00Z")) == ()
+    assert order_broken(at("10", "11")) == order_broken(at("10", "12")) == ()
 
 
 # what may begin

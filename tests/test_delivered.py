@@ -379,7 +379,7 @@ def test_the_last_word_of_a_sensor_is_in_the_table_and_in_the_hash_however_slow_
     monkeypatch.setattr(storage, "write_all", slow)
     contents, _ = run_faltering(monkeypatch, tmp_path, short_design(), "p")  # it notes something at the end
     assert "Lines of the sensor" in str(contents.records[-2].body)
-    of_table, of_journal = ending_of(contents.path.read_bytes())
+    of_table, of_journal, _ = ending_of(contents.path.read_bytes())
     assert of_table
     assert of_journal == sha256(b"".join(contents.path.read_bytes().splitlines(keepends=True)[:-1])).hexdigest()
 

@@ -410,6 +410,18 @@ def test_who_came_beyond_the_planned_number_is_named_and_all_as_planned_is_no_de
 
 
 @pytest.mark.slow
+def test_who_did_the_experiments_in_another_order_is_named_and_who_is_excluded_is_not(study: Path) -> None:
+    freeze(study, "", RealClock())
+    for code in ("P01", "P02", "P03"):
+        do(study, code)
+    register.append(study / "results", register.entry("excluded", "P03", reason="fell ill"), RealClock())
+    (order,) = of_kind(told(study), "order")
+    how = "preference was begun before direction was done, which comes first"
+    assert (order.what, order.who) == (how, ("P01", "P02"))
+    assert f"order | {how} | – | – | P01, P02" in report(told(study))
+
+
+@pytest.mark.slow
 def test_who_broke_off_has_not_finished_with_a_table_or_without(study: Path) -> None:
     of_preference_alone(study, 3)
     with_table, without, blank, _ = (do(study, code, person=False) for code in ("P01", "P02", "P03", "P04"))

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
 from pydantic import JsonValue
 
-from analysis.logs.files import ARCHIVE_FILE
-from analysis.logs.journals import RunFile, journal_of, run_file
+from analysis.logs.journals import RunFile, journal_of
 from analysis.logs.reading import Logs
+from analysis.summary.found_studies import FoundStudy, real_place
 from device.messages import how_many
 from experiments.config.door import read_toml
-from experiments.record import journal, storage
-from experiments.record.journal import Head, JournalError
+from experiments.record.journal import Head
 from experiments.record.provenance import recoil_version
 from experiments.study.changes import FileValues, changed_keys
-from experiments.study.folders import freeze_status
+from experiments.study.enrolment import order_broken
 from experiments.study.preregistration import (
     SHORT,
     Chain,
@@ -30,11 +28,10 @@ from experiments.study.preregistration import (
     changes_of_run,
     read_chain,
 )
-from experiments.study.register import Register, read_register
-from experiments.study.study import eligible
+from experiments.study.study import Participant, RunProgress, eligible
 
 DeviationKind = Literal[
-    "preregistration", "amended", "changed since", "run", "participants", "exclusion", "analysis", "version"
+    "preregistration", "amended", "changed since", "run", "order", "participants", "exclusion", "analysis", "version"
 ]
 
 
@@ -97,7 +94,7 @@ def deviations(logs: Logs, used: AnalysisFiles) -> tuple[tuple[StudyDeviations, 
     for run in logs.runs:
         runs.setdefault(run.study, []).append(run)
     for results, some in runs.items():
-        looked = _Looked.at(Path(results), logs, some) if Path(results).is_absolute() else None
+        looked = FoundStudy.at(Path(results), logs, some) if Path(results).is_absolute() else None
         if looked is not None:
             said += looked.stand.problems
             one = _of_study(looked, used)
@@ -112,125 +109,11 @@ def _not_made(folder: Path, found: StudyDeviations) -> Iterator[str]:
         yield f"{folder}: {how_many(count, 'frozen test')} not made; the report names each, and its warnings why"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """A run by its journal: the first record, and whether the last one says that it came to its end."""
-
-    file: RunFile
-    head: Head
-    finished: bool
-
-    @property
-    def code(self) -> str:
-        return self.file.participant
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Looked:
-    """One study as it was found: its register, its runs in the order in which they began, and how it stands.
-
-    `blank`: runs that were killed before anything was acknowledged; `unread`: those whose journal cannot be read.
-    `strangers`: the journals of whoever else has runs, as synthetic participants beside people. `elsewhere`: runs that
-    lie in the study's results and were not given to the analysis; `unread_elsewhere` as `unread`.
-    """
-
-    results: Path
-    logs: Logs
-    stand: FreezeStatus
-    registered: Register
-    runs: tuple[_Run, ...]
-    blank: tuple[RunFile, ...]
-    unread: tuple[RunFile, ...]
-    strangers: frozenset[str]
-    elsewhere: tuple[_Run, ...]
-    unread_elsewhere: tuple[RunFile, ...]
-
-    @classmethod
-    def at(cls, results: Path, logs: Logs, runs: Sequence[RunFile]) -> _Looked | None:
-        """`None` of a study that was never frozen, and of an archive, which has not what it is held against."""
-        folder = logs.folder_of(str(results))
-        if (folder / ARCHIVE_FILE).exists():
-            return None
-        chain = read_chain(folder)
-        if not (chain.every or chain.problems or any(_names_one(run.path) for run in runs)):
-            return None
-        given = _given(results, logs, runs)
-        read = [(run, _read(run)) for run in given.values()]
-        began = [one for _, one in read if isinstance(one, _Run)]
-        carried = [(one.head.plan.participant_id, one.head.preregistration_sha256) for one in began]
-        mine = [one for one in began if logs.kind == "synthetic" or one.head.participant == "person"]
-        whose = "synthetic" if logs.kind == "synthetic" else "person"
-        others = [(run, _read(run)) for run in _not_given(results, logs, given)]
-        return cls(
-            results=results,
-            logs=logs,
-            stand=freeze_status(folder, carried),
-            registered=read_register(results),
-            runs=tuple(sorted(mine, key=lambda one: one.head.utc)),
-            blank=tuple(run for run, one in read if one == "blank"),
-            unread=tuple(run for run, one in read if one == "unread"),
-            strangers=frozenset(_place(one.file.path) for one in began if one not in mine),
-            elsewhere=tuple(one for _, one in others if isinstance(one, _Run) and one.head.participant == whose),
-            unread_elsewhere=tuple(run for run, one in others if one == "unread"),
-        )
-
-    @property
-    def chain(self) -> Chain:
-        return self.stand.chain
-
-    @cached_property
-    def excluded(self) -> dict[str, str]:
-        """Who is excluded by hand, with the reason."""
-        members = self.registered.members.items()
-        return {code: member.excluded for code, member in members if member.excluded is not None}
-
-
-def _names_one(path: str) -> bool:
-    """Whether a journal names a preregistration: a look that is cheap enough for ten thousand of them."""
-    try:
-        return b'"preregistration_sha256":' in storage.first_line(path)
-    except OSError:
-        return False
-
-
-def _given(results: Path, logs: Logs, runs: Iterable[RunFile]) -> dict[str, RunFile]:
-    """By the place of its journal every run that the analysis knows, also where its table alone was given."""
-    found = {_place(run.path): run for run in runs}
-    for place in map(_place, map(journal_of, logs.paths)):
-        run = run_file(place, str(results))
-        if run is not None and Path(place).parent.parent == results:
-            found.setdefault(place, run)
-    return found
-
-
-def _not_given(results: Path, logs: Logs, given: Collection[str]) -> Sequence[RunFile]:
-    """The runs that it does not know."""
-    known = {*given, *(_place(journal_of(str(problem.file))) for problem in logs.problems)}
-    there = map(str, sorted(results.glob("sub-*/sub-*_journal.jsonl")))
-    return [file for path in there if path not in known and (file := run_file(path, str(results)))]
-
-
-def _place(path: str) -> str:
-    """A file by its real folder; its own name stays, also where it is a link."""
-    folder, name = os.path.split(path)
-    return f"{os.path.realpath(folder)}{os.sep}{name}"
-
-
-def _read(file: RunFile) -> _Run | Literal["blank", "unread"]:
-    path = Path(file.path)
-    try:
-        data = journal.journal_bytes(path)
-        head = journal.head_of(path, data)
-    except JournalError:  # why it cannot be read is said elsewhere
-        return "unread"
-    return "blank" if head is None else _Run(file=file, head=head, finished=any(journal.ending_of(data)))
-
-
-def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
+def _of_study(looked: FoundStudy, used: AnalysisFiles) -> StudyDeviations:
     last = looked.chain.last
     listed = [*_problems(looked)]
     if last is not None:
-        listed += [*_amended(looked.chain), *_changed(looked.stand), *_runs(looked)]
+        listed += [*_amended(looked.chain), *_changed(looked.stand), *_runs(looked), *_orders(looked, last)]
         listed += [*_participants(looked, last), *_exclusions(looked), *_analysis(last, used)]
     return StudyDeviations(
         study=looked.logs.names.get(str(looked.results), looked.chain.folder.name),
@@ -248,7 +131,7 @@ def _of_study(looked: _Looked, used: AnalysisFiles) -> StudyDeviations:
     )
 
 
-def _problems(looked: _Looked) -> Iterator[Deviation]:
+def _problems(looked: FoundStudy) -> Iterator[Deviation]:
     """What was edited or is missing, without the place on this machine."""
     folder = looked.chain.folder
     for text in looked.stand.problems:
@@ -271,7 +154,7 @@ def _changed(stand: FreezeStatus) -> Iterator[Deviation]:
 # the runs
 
 
-def _runs(looked: _Looked) -> Iterator[Deviation]:
+def _runs(looked: FoundStudy) -> Iterator[Deviation]:
     """What runs did otherwise: each difference once, with everybody of whom it holds."""
     found: dict[str, Deviation] = {}
     for one, code in _each_difference(looked):
@@ -281,7 +164,7 @@ def _runs(looked: _Looked) -> Iterator[Deviation]:
     yield from found.values()
 
 
-def _each_difference(looked: _Looked) -> Iterator[tuple[Deviation, str]]:
+def _each_difference(looked: FoundStudy) -> Iterator[tuple[Deviation, str]]:
     for run in looked.runs:
         if run.file.kind != "practice":
             yield from ((one, run.head.plan.participant_id) for one in _of_run(looked.chain, run.head))
@@ -339,7 +222,7 @@ def _version(what: str, frozen: Preregistration, now: str) -> Iterator[Deviation
 # the people
 
 
-def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]:
+def _participants(looked: FoundStudy, last: Preregistration) -> Iterator[Deviation]:
     study = last.study
     for experiment in dict.fromkeys(last.designs.values()):
         done = _finished(looked, experiment)
@@ -362,22 +245,37 @@ def _participants(looked: _Looked, last: Preregistration) -> Iterator[Deviation]
             yield Deviation(kind="participants", what=f"took part, not eligible: {reason}", who=(code,))
 
 
-def _finished(looked: _Looked, experiment: str) -> list[str]:
+def _orders(looked: FoundStudy, last: Preregistration) -> Iterator[Deviation]:
+    """Which experiments people did not do in the order of the study, each with everybody of whom it holds."""
+    order, found = list(dict.fromkeys(last.designs.values())), dict[str, list[str]]()
+    runs = [run for run in (*looked.runs, *looked.elsewhere) if _counts(looked, run.file, run.file.experiment)]
+    for code in dict.fromkeys(run.code for run in runs):
+        unread = [one.experiment for one in (*looked.unread, *looked.unread_elsewhere) if one.participant == code]
+        states = {name: RunProgress(experiment=name, state="unreadable") for name in unread}
+        states |= {run.file.experiment: run.progress for run in runs if run.code == code}
+        every = tuple(states.get(name, RunProgress(experiment=name, state="not begun")) for name in order)
+        for how in order_broken(Participant(participant_id=code, runs=every)):
+            found.setdefault(how, []).append(code)
+    for how, codes in found.items():
+        yield Deviation(kind="order", what=f"{how}, which comes first", who=tuple(codes))
+
+
+def _finished(looked: FoundStudy, experiment: str) -> list[str]:
     """Who finished an experiment and is not excluded by hand, in the order in which they began."""
     return [run.code for run in looked.runs if run.finished and _counts(looked, run.file, experiment)]
 
 
-def _unfinished(looked: _Looked, experiment: str) -> list[str]:
+def _unfinished(looked: FoundStudy, experiment: str) -> list[str]:
     """Who began an experiment, did not finish it, with a table or without, and is not excluded by hand."""
     files = [*(run.file for run in looked.runs if not run.finished), *looked.blank]
     return [file.participant for file in files if _counts(looked, file, experiment)]
 
 
-def _counts(looked: _Looked, file: RunFile, experiment: str) -> bool:
+def _counts(looked: FoundStudy, file: RunFile, experiment: str) -> bool:
     return file.kind == "run" and file.experiment == experiment and file.participant not in looked.excluded
 
 
-def _exclusions(looked: _Looked) -> Iterator[Deviation]:
+def _exclusions(looked: FoundStudy) -> Iterator[Deviation]:
     """Exclusions by hand, logs that cannot be used, and runs that were set aside."""
     for code, reason in looked.excluded.items():
         yield Deviation(kind="exclusion", what=f"excluded by hand: {reason}", who=(code,))
@@ -386,7 +284,7 @@ def _exclusions(looked: _Looked) -> Iterator[Deviation]:
             what = f"an unfinished run of {run.file.experiment} was set aside"
             yield Deviation(kind="exclusion", what=what, who=(run.code,))
     for problem in looked.logs.problems:
-        person, place = (problem.participant, problem.experiment), _place(journal_of(str(problem.file)))
+        person, place = (problem.participant, problem.experiment), real_place(journal_of(str(problem.file)))
         mine = problem.study == str(looked.results) and all(person) and place not in looked.strangers
         if mine and problem.participant not in looked.excluded:
             why = problem.message.partition(";")[0].replace(f"{problem.file.parent}{os.sep}", "")

@@ -388,8 +388,8 @@ def contents_of(path: Path, data: bytes) -> Contents | None:
     )
 
 
-def ending_of(data: bytes) -> tuple[str, str]:
-    """Of the bytes of a finished journal the hash of its table, and that of itself; empty of one that is not finished.
+def ending_of(data: bytes) -> tuple[str, str, str]:
+    """Of the bytes of a finished journal the hash of its table, that of itself, and when it ended; else empty.
 
     The second is empty as well if any byte before the last record was changed. Much quicker than reading every record.
     """
@@ -397,9 +397,9 @@ def ending_of(data: bytes) -> tuple[str, str]:
     with suppress(LineError):
         value = parsed_line(line)
         if value.get("kind") == "finished" and line.endswith(b"\n"):
-            itself = hashlib.sha256(before).hexdigest()
-            return str(value.get("table_sha256")), itself if itself == value.get("journal_sha256") else ""
-    return "", ""
+            itself, said = hashlib.sha256(before).hexdigest(), value.get("journal_sha256")
+            return str(value.get("table_sha256")), itself if itself == said else "", str(value.get("utc"))
+    return "", "", ""
 
 
 def head_of(path: Path, data: bytes) -> Head | None:

@@ -66,7 +66,7 @@ def order_broken(person: Participant) -> tuple[str, ...]:
         for first, then in combinations(person.runs, 2)
         if then.state in ("done", "in progress", "open elsewhere")
         and first.state != "unreadable"
-        and (first.state != "done" or "" < then.last_utc < first.last_utc)
+        and (first.state != "done" or "" < then.began_utc < first.last_utc)
     )
 
 

@@ -357,15 +357,15 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
     """
     if contents is None:
         return RunProgress(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
-    plan = contents.plan
-    check_whose(where, plan)
-    head, told, design = contents.head, replay.history(contents), began_with(contents.head)
+    check_whose(where, contents.plan)
+    head, plan, told, design = contents.head, contents.plan, replay.history(contents), began_with(contents.head)
     state: RunState = "done" if contents.finished else "open elsewhere" if elsewhere else "in progress"
     return RunProgress(
         experiment=where.experiment,
         state="synthetic" if head.participant == "synthetic" and state != "open elsewhere" else state,
         answered=len(answered(told, design.judgements)),
         planned=len(plan.trials),
+        began_utc=head.utc,
         last_utc=contents.records[-1].utc,
         methods=order_shown(design, plan),
         data=data_of(head),

@@ -35,16 +35,17 @@ class Facts(Model):
 class RunProgress:
     """How far a participant has come in one experiment.
 
-    `answered` of `planned` trials, `last_utc` the time of the last record, `methods` in the order of the run, and whose
-    `data` they are. All five are empty where no run has begun, or where its journal cannot be read. `practised`: a
-    practice was done to its end; `practice_missed`: in none was enough right, as the design wants it. `language`: the
-    participant's, where that is not English.
+    `answered` of `planned` trials, `began_utc` and `last_utc` the times of the first and the last record, `methods` in
+    the order of the run, and whose `data` they are. All six are empty where no run has begun, or where its journal
+    cannot be read. `practised`: a practice was done to its end; `practice_missed`: in none was enough right, as the
+    design wants it. `language`: the participant's, where that is not English.
     """
 
     experiment: str
     state: RunState
     answered: int = 0
     planned: int = 0
+    began_utc: str = ""
     last_utc: str = ""
     methods: tuple[str, ...] = ()
     data: DataKind | None = None
