@@ -150,13 +150,13 @@ _POWER = "switch off its power"
 
 
 def _refuse_person(request: RunRequest, place: Place, registered: Register) -> None:
-    """`PlaceError` for whoever is excluded, and for a practice where there is none."""
+    """`PlaceError` for whoever is excluded or left, and for a practice where there is none."""
     if request.practice:
         folders.refuse_without_practice(request.setup)
-    reason = registered.excluded().get(place.participant_id)
-    if reason is not None:
+    member = registered.trusted().get(place.participant_id)
+    if member is not None and member.gone:
         raise PlaceError(
-            f"participant {place.participant_id} is excluded ({reason}); "
+            f"participant {place.participant_id} {member.gone}; "
             "readmit them with `recoil study`; somebody else has a code of their own"
         )
 

@@ -19,12 +19,13 @@ from experiments.study.register import read_register
 from experiments.study.study import Facts, Participant, RunProgress, eligible, taking_part
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
+_REASONED = {"exclude": enrolment.exclude, "left": enrolment.leave, "readmit": enrolment.readmit}
 _UNDER_WAY = ("in progress", "open elsewhere", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyChange:
-    """What was asked for: someone joins with facts, or is excluded or readmitted for a reason."""
+    """What was asked for: someone joins with facts, or is excluded, gone or readmitted for a reason."""
 
     action: str
     participant_id: str
@@ -56,10 +57,10 @@ def _refuse_stray(action: str, facts: Mapping[str, object], reason: str | None) 
     given = [_OPTIONS[fact] for fact, value in facts.items() if value is not None]
     if given and action != "join":
         raise PlaceError(f"{', '.join(given)}: facts go with --join CODE")
-    if reason is None and action in ("exclude", "readmit"):
+    if reason is None and action in _REASONED:
         raise PlaceError(f"--{action}: needs --reason TEXT, which is kept in the register; never a name")
-    if reason is not None and action not in ("exclude", "readmit"):
-        raise PlaceError("--reason: goes with --exclude CODE or --readmit CODE")
+    if reason is not None and action not in _REASONED:
+        raise PlaceError("--reason: goes with --exclude CODE, --left CODE or --readmit CODE")
 
 
 def _facts(values: Mapping[str, object]) -> Facts:
@@ -85,11 +86,10 @@ def _carry_out(where: StudyFolder, change: StudyChange) -> tuple[str, ...]:
         reasons = enrolment.join(where, code, change.facts, clock)
         doubt = doubt_text(code, known, where.config.code_prefix)
         return (
-            *([f"{doubt} It is recorded; --exclude {code} leaves it out"] if doubt else []),
+            *([f"{doubt} It is recorded; --left {code} says that it was nobody's"] if doubt else []),
             *(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons),
         )
-    act = enrolment.exclude if change.action == "exclude" else enrolment.readmit
-    act(where.results, code, change.reason, clock)
+    _REASONED[change.action](where.results, code, change.reason, clock)
     return ()
 
 
@@ -113,6 +113,7 @@ def _participant(found: StudyStatus, one: Participant) -> dict[str, object]:
         "facts": one.facts and one.facts.model_dump(mode="json"),
         "joined_utc": one.joined_utc or None,
         "excluded": one.excluded,
+        "left": one.left,
         "not_eligible": list(_not_eligible(found, one)),
         "order_broken": list(enrolment.order_broken(one)),
         "experiments": {run.experiment: _run(run) for run in one.runs},
@@ -147,9 +148,10 @@ def _cells(found: StudyStatus, one: Participant) -> Iterator[str]:
     for run in one.runs:
         yield _state(run)
     excluded = [] if one.excluded is None else [f"excluded: {one.excluded}"]
+    left = [] if one.left is None else [f"comes no more: {one.left}"]
     ineligible = [f"not eligible: {reason}" for reason in _not_eligible(found, one)]
     broken = [f"order broken: {how}" for how in enrolment.order_broken(one)]
-    yield "\n".join([*excluded, *ineligible, *broken])
+    yield "\n".join([*excluded, *left, *ineligible, *broken])
 
 
 def _state(run: RunProgress) -> str:
@@ -166,7 +168,8 @@ def _count_lines(found: StudyStatus) -> Iterator[str]:
     people = found.overview.participants
     done = sum(all(run.state == "done" for run in one.runs) for one in taking_part(people))
     excluded = sum(one.excluded is not None for one in people)
-    yield f"{done} of {how_many(found.study.config.participants, 'participant')} done, {excluded} excluded"
+    left = f", {gone} left" if (gone := sum(one.excluded is None and one.left is not None for one in people)) else ""
+    yield f"{done} of {how_many(found.study.config.participants, 'participant')} done, {excluded} excluded{left}"
     if synthetic := [run for one in people for run in one.runs if run.state == "synthetic"]:
         runs = f"{how_many(len(synthetic), 'run')} of synthetic participants"
         yield f"{runs}: not counted, and set aside when a person comes to that code and experiment"

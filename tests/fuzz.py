@@ -349,6 +349,7 @@ _ENTRIES = (
     {"kind": "joined", "participant_id": "P01", "facts": {"age_years": 24, "sex": "female", "handedness": "right"}},
     {"kind": "joined", "participant_id": "P02", "facts": {}},
     {"kind": "excluded", "participant_id": "P01", "reason": "left-handed"},
+    {"kind": "left", "participant_id": "P01", "reason": "moved away"},
     {"kind": "readmitted", "participant_id": "P01", "reason": "a slip"},
     {"kind": "set-aside", "participant_id": "P02", "experiment": "direction", "reason": "fire alarm"},
 )

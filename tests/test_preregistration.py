@@ -20,6 +20,7 @@ from analysis.summary.analyze import Request, analyze, result_files
 from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.deviations import AnalysisFiles, Deviation, StudyDeviations, deviations, frozen_tests
+from analysis.summary.participation import participation
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.preregistration import deviations_sections
@@ -419,6 +420,25 @@ def test_who_did_the_experiments_in_another_order_is_named_and_who_is_excluded_i
     how = "preference was begun before direction was done, which comes first"
     assert (order.what, order.who) == (how, ("P01", "P02"))
     assert f"order | {how} | – | – | P01, P02" in report(told(study))
+
+
+@pytest.mark.slow
+def test_who_left_is_named_with_the_reason_and_a_code_that_was_nobodys_took_no_part(study: Path) -> None:
+    results, clock = study / "results", RealClock()
+    freeze(study, "", clock)
+    do(study, "P01")
+    old = Facts(age_years=40, sex="female", handedness="right")
+    for code, reason in {"P01": "moved away", "X99": "mistyped for P01"}.items():
+        register.append(results, register.entry("joined", code, facts=old), clock)
+        register.append(results, register.entry("left", code, reason=reason), clock)
+    of_people = [(one.what, one.who) for one in of_kind(told(study), "participants")[2:]]
+    assert of_people == [
+        ("comes no more: moved away", ("P01",)),
+        ("took part, not eligible: age_years = 40: must be at most 29", ("P01",)),
+        ("comes no more: mistyped for P01", ("X99",)),
+    ]
+    absent = participation(read_logs([results]), {"preference": ["P01"]}, ()).absent
+    assert [(one.participant, one.state) for one in absent] == [("X99", "not done: comes no more (mistyped for P01)")]
 
 
 @pytest.mark.slow

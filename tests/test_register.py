@@ -40,6 +40,7 @@ ENTRIES = (
     joined("P01"),
     entry("excluded", "P02", reason="felt ill – “stopped”"),
     joined("P02", age_years=29, sex="undisclosed"),
+    entry("left", "P02", reason="moved away"),
     entry("readmitted", "P02", reason="came back"),
     joined("P01", age_years=26),
 )
@@ -93,6 +94,7 @@ codes = st.sampled_from(["P01", "P02", "P03"])
 any_entry = st.one_of(
     st.builds(lambda code, age: joined(code, age_years=age), codes, st.integers(1, 120)),
     st.builds(lambda code: entry("excluded", code, reason="r"), codes),
+    st.builds(lambda code: entry("left", code, reason="r"), codes),
     st.builds(lambda code: entry("readmitted", code, reason="r"), codes),
     st.builds(lambda code: entry("set-aside", code, experiment="direction", reason="r"), codes),
 )
@@ -105,9 +107,10 @@ def test_the_state_of_a_code_is_what_its_own_last_records_say(entries: list[Regi
     assert set(found) == {one.participant_id for one in entries}
     for code, member in found.items():
         facts = [one.facts for one in entries if one.participant_id == code and isinstance(one, register.Joined)]
-        marks = [one.kind for one in entries if one.participant_id == code and one.kind in ("excluded", "readmitted")]
+        kinds = [one.kind for one in entries if one.participant_id == code and one.kind not in ("joined", "set-aside")]
         assert member.facts == (facts[-1] if facts else None)
-        assert (member.excluded is not None) == (marks[-1:] == ["excluded"])
+        for said, kind in ((member.excluded, "excluded"), (member.left, "left")):
+            assert (said is not None) == ([one for one in kinds if one in (kind, "readmitted")][-1:] == [kind])
 
 
 # what breaks a rule is refused
@@ -165,7 +168,7 @@ def test_a_register_cut_off_at_any_byte_holds_its_whole_records_and_can_be_gone_
         assert found.problem == ""
         assert tuple(one for _, one in found.entries) == ENTRIES[: data[:length].count(b"\n")]
     append(results, joined("P09"), VirtualClock())
-    assert [one.participant_id for _, one in read_register(results).entries] == ["P01", "P02", "P02", "P02", "P09"]
+    assert [one.participant_id for _, one in read_register(results).entries] == ["P01", *["P02"] * 4, "P09"]
 
 
 @pytest.mark.slow

@@ -701,6 +701,20 @@ def test_somebody_is_excluded_for_a_reason_and_readmitted(study: StudyFolder, op
     assert entries(study) == [("excluded", "P01"), ("readmitted", "P01")]
 
 
+def test_who_left_is_not_offered_as_next_and_comes_again_by_being_readmitted(study: StudyFolder, opened: Open) -> None:
+    do(study, "P01", records=40)
+    enrolment.leave(study.results, "P01", "moved away", VirtualClock())
+    window = opened()
+    assert window.form.participant_id == "P02"
+    fill(window, "P01")
+    assert (table(window)["P01"][-1], remark(window)) == ("comes no more: moved away", "P01 comes no more: moved away.")
+    key(window, "E", ALT)
+    assert question(window).startswith("Readmit P01? On record is: comes no more: moved away.")
+    QTest.keyClicks(QApplication.focusWidget(), "is back")
+    key(window, "D", CTRL)
+    assert entries(study) == [("left", "P01"), ("readmitted", "P01")]
+
+
 def test_nobody_is_excluded_whom_the_study_does_not_know(study: StudyFolder, opened: Open) -> None:
     window = opened()
     fill(window, "P07")

@@ -318,6 +318,31 @@ def test_an_exclusion_gives_the_row_to_the_next_one_until_it_is_taken_back(recoi
     assert found["next"]["orders"]["direction"] == found["participants"][0]["experiments"]["direction"]["methods"]
 
 
+def test_who_left_and_a_code_that_was_nobodys_come_no_more_and_what_was_done_counts(
+    recoil: Recoil, pilot: Path
+) -> None:
+    do(pilot, "P01")
+    recoil("study", "pilot", "--join", "X99", *RIGHT)
+    assert told(recoil)["next"]["participant_id"] == "P01"
+    found = told(recoil, "--left", "P01", "--reason", "moved away")
+    assert found["next"]["participant_id"] == "X99"
+    found = told(recoil, "--left", "X99", "--reason", "mistyped for P01")
+    assert [one["left"] for one in found["participants"]] == ["moved away", "mistyped for P01"]
+    assert (found["next"]["participant_id"], found["next"]["new"]) == ("P02", True)
+    shown = recoil("study", "pilot").stdout
+    assert "comes no more: moved away" in shown
+    assert "0 of 14 participants done, 0 excluded, 2 left" in shown
+    words = ("--participant", "X99", "--screen", "synthetic", "--seed", 1, "--results", "pilot/results")
+    refused(recoil("run", "pilot/direction.toml", *words), "X99 comes no more (mistyped for P01); readmit them")
+    refused(recoil("study", "pilot", "--left", "X99", "--reason", "?"), "X99 comes no more (mistyped for P01) already")
+    found = told(recoil, "--readmit", "P01", "--reason", "is back")
+    assert [one["left"] for one in found["participants"]] == [None, "mistyped for P01"]
+    assert found["next"]["participant_id"] == "P01"
+    do(pilot, "P01", "preference")
+    assert told(recoil, "--left", "P01", "--reason", "done anyway")["next"]["participant_id"] == "P02"
+    assert "1 of 14 participants done, 0 excluded, 2 left" in recoil("study", "pilot").stdout
+
+
 # wrong usage
 
 
@@ -328,6 +353,7 @@ def test_an_exclusion_gives_the_row_to_the_next_one_until_it_is_taken_back(recoi
         (("--readmit", "P01", "--reason", "back"), ("P01 is not excluded",)),
         (("--readmit", "P09", "--reason", "back"), ("P09 is not known",)),
         (("--exclude", "P01"), ("--exclude: needs --reason",)),
+        (("--left", "P01"), ("--left: needs --reason",)),
         (("--exclude", "P01", "--reason", " "), ("reason = ' '", "must say why")),
         (("--exclude", "P01", "--reason", "two\nlines"), ("must say why",)),
         (("--exclude", "P01", "--reason", "x" * 201), ("200",)),

@@ -240,8 +240,12 @@ def _participants(looked: FoundStudy, last: Preregistration) -> Iterator[Deviati
             yield Deviation(kind="participants", what=what, who=tuple(missing))
         if stopped := _unfinished(looked, experiment):
             yield Deviation(kind="participants", what=f"began {experiment} and did not finish it", who=tuple(stopped))
+    came = {run.code for run in (*looked.runs, *looked.elsewhere)}
     for code, member in looked.registered.members.items():
-        for reason in () if member.facts is None else eligible(member.facts, study.eligibility):
+        if member.left is not None:
+            yield Deviation(kind="participants", what=f"comes no more: {member.left}", who=(code,))
+        judged = None if member.left is not None and code not in came else member.facts
+        for reason in () if judged is None else eligible(judged, study.eligibility):
             yield Deviation(kind="participants", what=f"took part, not eligible: {reason}", who=(code,))
 
 

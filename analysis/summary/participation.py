@@ -53,25 +53,26 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
     why = {(one.participant, one.experiment): one for one in told}
     begun = {(logs.person(run.file.study, run.file.participant), run.file.experiment): run for run in logs.begun}
     runs = [(logs.person(run.study, run.participant), run) for run in logs.runs]
-    joined = {logs.person(study, one.participant_id) for study, one in logs.joined}
+    joined = {logs.person(study, one.participant_id): one for study, one in logs.joined}
     people = set().union(*within.values(), (who for who, _ in why), (who for who, _ in begun))
     nobody = {one.participant for one in excluded if one.rule == NEVER_TOGETHER} - people  # of another kind of data
     runs = [(who, run) for who, run in runs if who not in nobody]
-    people |= (joined - nobody) | {who for who, _ in runs}
+    people |= (joined.keys() - nobody) | {who for who, _ in runs}
     done = [*why, *begun, *((who, run.experiment) for who, run in runs)]
     done += [(who, name) for name, some in within.items() for who in some]
     names = list(dict.fromkeys([*within, *(name for _, name in why), *(run.experiment for _, run in runs)]))
     there = {(_study_of(who), name) for who, name in done}
 
     def state(who: str, experiment: str) -> str:
+        gone = f"; comes no more ({joined[who].left})" if who in joined and joined[who].left is not None else ""
         if who in within.get(experiment, ()):
             return ""
         if (who, experiment) in begun:
-            return f"begun: {begun[who, experiment].far}"
+            return f"begun: {begun[who, experiment].far}{gone}"
         if (who, experiment) in why:
             one = why[who, experiment]
-            return f"{'begun' if one.rule == FINISHED else 'left out'}: {one.reason}"
-        return "not done" if (_study_of(who), experiment) in there else ""
+            return f"{'begun' if one.rule == FINISHED else 'left out'}: {one.reason}{gone}"
+        return f"not done{gone.replace(';', ':')}" if (_study_of(who), experiment) in there else ""
 
     order = sorted(people, key=by_code)
     absent = tuple(

@@ -1,4 +1,4 @@
-"""Who is taken into a study, excluded and readmitted, and which experiment somebody comes to."""
+"""Who is taken into a study, excluded, gone and readmitted, and which experiment somebody comes to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from experiments.study import folders, register
 from experiments.study.folders import RETEST, PlaceError, StudyFolder, look_at
 from experiments.study.preregistration import STUDY_FILE
 from experiments.study.register import RegisterError
-from experiments.study.study import Facts, Participant, RunProgress, eligible, unanswered, unasked
+from experiments.study.study import Facts, Member, Participant, RunProgress, eligible, unanswered, unasked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,8 +110,8 @@ def enrolment_refusal(
     code = person.participant_id
     elsewhere = [run.experiment for run in person.runs if run.state == "open elsewhere"]
     missing, reasons = unanswered(facts, rules), eligible(facts, rules)
-    if person.excluded is not None:
-        return f"{code} is excluded ({person.excluded}): readmit them first; somebody else has a code of their own."
+    if person.gone:
+        return f"{code} {person.gone}: readmit them first; somebody else has a code of their own."
     if elsewhere:
         return f"{code} sits at another console, where {elsewhere[0]} is open: close it there first."
     if not practice and run_of(person, entered.experiment).state == "done":
@@ -268,21 +268,35 @@ def exclude(results: Path, participant_id: str, reason: str, clock: Clock) -> No
 
     `PlaceError` if they are not known, excluded, or at a run now. `JournalError`: a journal cannot be opened.
     """
-    before = _excluded_before(results, participant_id)
+    before = _on_record(results, participant_id).excluded
     if before is not None:
         raise PlaceError(f"participant {participant_id} is excluded already ({before}); readmit them to change that")
     folders.refuse_open_run(results, participant_id)
     _record(results, "excluded", participant_id, reason, clock)
 
 
+def leave(results: Path, participant_id: str, reason: str, clock: Clock) -> None:
+    """Record that someone comes no more, or that a code was nobody's; what was done under it still counts.
+
+    Raises as `exclude`.
+    """
+    before = _on_record(results, participant_id).gone
+    if before:
+        raise PlaceError(f"participant {participant_id} {before} already; readmit them to change that")
+    folders.refuse_open_run(results, participant_id)
+    _record(results, "left", participant_id, reason, clock)
+
+
 def readmit(results: Path, participant_id: str, reason: str, clock: Clock) -> None:
-    """Count someone again who was excluded. `PlaceError` if they are not known, or not excluded."""
-    if _excluded_before(results, participant_id) is None:
-        raise PlaceError(f"participant {participant_id} is not excluded, so there is nothing to take back")
+    """Count someone again who was excluded or had left. `PlaceError` if they are not known, or neither."""
+    if not _on_record(results, participant_id).gone:
+        raise PlaceError(
+            f"participant {participant_id} is not excluded and has not left: there is nothing to take back"
+        )
     _record(results, "readmitted", participant_id, reason, clock)
 
 
-def _excluded_before(results: Path, participant_id: str) -> str | None:
+def _on_record(results: Path, participant_id: str) -> Member:
     registered = register.read_register(results)
     known = folders.known_codes(results, registered)
     folders.check_code(participant_id)
@@ -290,7 +304,7 @@ def _excluded_before(results: Path, participant_id: str) -> str | None:
     if participant_id not in known:
         shown = ", ".join(known) or "nobody"
         raise PlaceError(f"participant {participant_id} is not known in {results}; known are {shown}")
-    return registered.excluded().get(participant_id)
+    return registered.trusted().get(participant_id, Member(participant_id=participant_id))
 
 
 def _record(results: Path, kind: str, participant_id: str, reason: str, clock: Clock) -> None:

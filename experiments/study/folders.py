@@ -276,6 +276,7 @@ class _Look:
             facts=member.facts,
             joined_utc=member.joined_utc,
             excluded=member.excluded,
+            left=member.left,
         )
 
     def _run(self, where: Place) -> RunProgress:
@@ -290,8 +291,7 @@ class _Look:
         if not where.journal.exists():
             return RunProgress(experiment=where.experiment, state="not begun")
         elsewhere = _is_held(where.journal)
-        data = self._data(where.journal)
-        contents = journal.contents_of(where.journal, data)
+        contents = journal.contents_of(where.journal, self._data(where.journal))
         if contents is not None and contents.finished and not elsewhere and not where.table.exists():
             self.problems.append(
                 f"{where.table}: is missing, though the run is finished; `recoil rebuild {where.journal}` makes it "

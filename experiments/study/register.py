@@ -1,4 +1,4 @@
-"""The register of a results folder: who joined with which facts, who is excluded, whose run was set aside, and why.
+"""The register of a results folder: who joined with which facts, is excluded, left, had a run set aside, and why.
 
 Codes only, never names. `participants.jsonl` is written and read like a journal: one JSON object a line, appended and
 synced record by record, each with its number, the date and time, and the hash of the line before it. A later `joined`
@@ -63,8 +63,16 @@ class Excluded(Model):
     reason: _Reason
 
 
+class Departed(Model):
+    """Someone comes no more, or a code was mistyped and nobody's: what was done under it still counts."""
+
+    kind: Literal["left"] = "left"
+    participant_id: _Code
+    reason: _Reason
+
+
 class Readmitted(Model):
-    """Someone who was excluded counts again."""
+    """Someone who was excluded, or had left, counts again."""
 
     kind: Literal["readmitted"] = "readmitted"
     participant_id: _Code
@@ -80,7 +88,7 @@ class SetAside(Model):
     reason: _Reason
 
 
-RegisterEntry = Joined | Excluded | Readmitted | SetAside
+RegisterEntry = Joined | Excluded | Departed | Readmitted | SetAside
 _REASON: TypeAdapter[str] = TypeAdapter(_Reason)
 _ENTRY: TypeAdapter[RegisterEntry] = TypeAdapter(
     Annotated[RegisterEntry, Field(discriminator="kind")], config=ConfigDict(defer_build=True)
@@ -137,10 +145,14 @@ class Register:
             found[one.participant_id] = _after(before, utc, one)
         return found
 
-    def excluded(self) -> dict[str, str]:
-        """Who is excluded, with the reason. `RegisterError` if it cannot be trusted: someone might be missing."""
+    def trusted(self) -> dict[str, Member]:
+        """As `members`. `RegisterError` if the register cannot be trusted: someone might be missing."""
         _refuse_problem(self)
-        return {code: member.excluded for code, member in self.members.items() if member.excluded is not None}
+        return self.members
+
+    def excluded(self) -> dict[str, str]:
+        """Who is excluded, with the reason. `RegisterError` as of `trusted`."""
+        return {code: member.excluded for code, member in self.trusted().items() if member.excluded is not None}
 
 
 def _after(before: Member, utc: str, one: RegisterEntry) -> Member:
@@ -148,7 +160,11 @@ def _after(before: Member, utc: str, one: RegisterEntry) -> Member:
         return replace(before, facts=one.facts, joined_utc=before.joined_utc or utc)
     if isinstance(one, SetAside):
         return before
-    return replace(before, excluded=one.reason if isinstance(one, Excluded) else None)
+    if isinstance(one, Departed):
+        return replace(before, left=one.reason)
+    if isinstance(one, Excluded):
+        return replace(before, excluded=one.reason)
+    return replace(before, excluded=None, left=None)
 
 
 def read_register(results: Path) -> Register:

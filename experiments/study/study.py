@@ -56,12 +56,20 @@ class RunProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Member:
-    """What the register says of one code: facts and when they joined, if they did; the reason if excluded."""
+    """What the register says of one code: facts and when they joined, if they did; why excluded, why they left."""
 
     participant_id: str
     facts: Facts | None = None
     joined_utc: str = ""
     excluded: str | None = None
+    left: str | None = None
+
+    @property
+    def gone(self) -> str:
+        """Why nobody may run under this code; empty if somebody may."""
+        if self.excluded is not None:
+            return f"is excluded ({self.excluded})"
+        return "" if self.left is None else f"comes no more ({self.left})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +92,7 @@ class Participant(Member):
     def is_synthetic(self) -> bool:
         """Whether nobody but a synthetic participant had this code so far, so that it is free for a person."""
         states = {run.state for run in self.runs}
-        on_record = bool(self.joined_utc) or self.facts is not None or self.excluded is not None
+        on_record = bool(self.joined_utc) or self.facts is not None or bool(self.gone)
         return "synthetic" in states and states <= {"synthetic", "not begun"} and not on_record
 
     @property
@@ -140,8 +148,9 @@ def unasked(facts: Facts, eligibility: EligibilityConfig) -> tuple[Fact, ...]:
 
 
 def taking_part(people: Sequence[Participant]) -> list[Participant]:
-    """Those who count: people, and not excluded."""
-    return [one for one in people if one.excluded is None and not one.is_synthetic]
+    """Those who count: people who are not excluded, and did not leave before they were done with everything."""
+    counted = [one for one in people if one.excluded is None and not one.is_synthetic]
+    return [one for one in counted if one.left is None or not one.open_runs]
 
 
 def who_is_next(
@@ -149,7 +158,7 @@ def who_is_next(
 ) -> NextParticipant | None:
     """Who is in progress, else who joined and is not finished, else the next free code; in order of their codes.
 
-    `None` when the study has its participants and none of them waits. Who is excluded does not count: a new
+    `None` when the study has its participants and none of them waits. Who is excluded or left does not count: a new
     participant takes their place. Who sits at another console does not wait.
     """
     counted = sorted(taking_part(people), key=lambda one: by_code(one.participant_id))

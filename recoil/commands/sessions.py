@@ -140,7 +140,8 @@ def study(
     sex: Annotated[str | None, typer.Option(help="With --join: female, male, other or undisclosed.")] = None,
     handedness: Annotated[str | None, typer.Option(help="With --join: right, left or both.")] = None,
     exclude: Annotated[str | None, typer.Option(metavar="CODE", help="Exclude a participant; needs --reason.")] = None,
-    readmit: Annotated[str | None, typer.Option(metavar="CODE", help="Take an exclusion back; needs --reason.")] = None,
+    left: Annotated[str | None, typer.Option(metavar="CODE", help="Comes no more, or was nobody; --reason.")] = None,
+    readmit: Annotated[str | None, typer.Option(metavar="CODE", help="Take either back; needs --reason.")] = None,
     reason: Annotated[str | None, typer.Option(help="Why; never a name.")] = None,
     as_json: AsJsonOption = False,
 ) -> None:
@@ -148,7 +149,7 @@ def study(
     from recoil import study as feature
 
     facts = {"age_years": age, "sex": sex, "handedness": handedness}
-    options = {"join": join, "exclude": exclude, "readmit": readmit}
+    options = {"join": join, "exclude": exclude, "left": left, "readmit": readmit}
     found, notes = feature.study(folder, feature.change(options, facts, reason))
     for message in (*notes, *found.overview.problems):
         say(f"recoil: {message}")

@@ -25,7 +25,9 @@ def cell_text(run: RunProgress) -> str:
 
 def note_text(person: Participant) -> str:
     """What the table says of somebody beside their runs."""
-    return "" if person.excluded is None else phrase("excluded: {excluded}", excluded=person.excluded)
+    if person.excluded is not None:
+        return phrase("excluded: {excluded}", excluded=person.excluded)
+    return "" if person.left is None else phrase("comes no more: {left}", left=person.left)
 
 
 def stopped_text(code: str, run: RunProgress) -> str:
@@ -148,6 +150,8 @@ def _hindrances(person: Participant, experiment: str, experiments: Sequence[str]
     code, run = person.participant_id, run_of(person, experiment)
     if person.excluded is not None:
         yield phrase("{code} is excluded: {excluded}.", code=code, excluded=person.excluded), "bad"
+    elif person.left is not None:
+        yield phrase("{code} comes no more: {left}.", code=code, left=person.left), "bad"
     if person.is_elsewhere:
         yield phrase("{code} sits at another console.", code=code), "bad"
     if run.state == "unreadable":

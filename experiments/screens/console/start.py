@@ -146,7 +146,7 @@ class StartWindow(QtWidgets.QWidget):
     def _propose(self, participant_id: str) -> None:
         """Who was there before if they have something left to do, else who comes next."""
         before, coming = self._person(participant_id), self._seen.next
-        if before is None or before.excluded is not None or not before.open_runs:
+        if before is None or before.gone or not before.open_runs:
             participant_id = "" if coming is None else coming.participant_id
         self.form.code.setText(participant_id)
         self._follow_code()
@@ -169,7 +169,7 @@ class StartWindow(QtWidgets.QWidget):
         doubt = people.doubt_text(code, known, self._study.config.code_prefix)
         said = (doubt, "ask") if doubt else people.remark(code, person, experiment, self._study.experiments)
         self.form.remark.say(*said)
-        out = person is not None and person.excluded is not None
+        out = person is not None and bool(person.gone)
         self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
         self.shots.choose(self._setup())
         self.test_button.setText(phrase("{next}  [Ctrl+T]", next=self.shots.next_text()))
@@ -345,11 +345,11 @@ class StartWindow(QtWidgets.QWidget):
             self._take_back()
             self.say(phrase("Choose in the table who is to be excluded; a code that is not there needs none."), "bad")
             return
-        out = person.excluded is not None
+        out = bool(person.gone)
         verb, act = (phrase("Readmit"), enrolment.readmit) if out else (phrase("Exclude"), enrolment.exclude)
         text = f"{verb} {person.participant_id}? "
         text += (
-            phrase("They are excluded: {excluded}.", excluded=person.excluded)
+            phrase("On record is: {note}.", note=people.note_text(person))
             if out
             else phrase("Their logs stay, but are left out of the analysis.")
         )
