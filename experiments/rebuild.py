@@ -16,6 +16,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.record import design_columns, design_table, replay, storage
 from experiments.record.journal import ENDING, Contents, Head, JournalError, read_journal
+from experiments.record.provenance import recoil_version
 from experiments.record.shots_table import SHOTS, shot_rows
 from experiments.record.tables import table_bytes
 
@@ -32,7 +33,16 @@ def began_with(head: Head) -> DesignConfig:
     try:
         return checked_table(DesignConfig, design, f"{head.path}: line 1")
     except ConfigError as error:
-        raise JournalError(f"{error}; the journal was changed, or another version of Recoil wrote it") from error
+        raise changed_or_foreign(head, error) from error
+
+
+def changed_or_foreign(head: Head, error: ConfigError) -> JournalError:
+    """What is said of a journal whose setup this version cannot read: to be corrected as a config it is not."""
+    wrote = head.provenance.get("recoil", "unknown")
+    return JournalError(
+        f"{error}; but correct nothing in a journal: it was changed, or another version of Recoil wrote it (it names "
+        f"{wrote}, this is {recoil_version()}), which reads and rebuilds it"
+    )
 
 
 def table(contents: Contents) -> bytes:

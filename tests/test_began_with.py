@@ -14,6 +14,7 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
+from experiments.rebuild import rebuild
 from experiments.record.journal import JournalError, read_journal
 from experiments.run import run
 from experiments.run_request import RunRequest
@@ -241,6 +242,13 @@ def test_a_file_that_is_no_journal_is_refused(data: bytes, said: str, tmp_path: 
     (tmp_path / "some.jsonl").write_bytes(data)
     with pytest.raises(JournalError, match=said):
         copy_began_with(tmp_path / "some.jsonl", tmp_path / "back")
+
+
+def test_a_journal_with_a_key_that_this_version_does_not_know_is_not_to_be_corrected(tmp_path: Path) -> None:
+    path = journal_of(configs(tmp_path / "lab") / "preference.toml", tmp_path)
+    said = r"sparkle = true: unknown key.*; but correct nothing in a journal.* another version of Recoil wrote it"
+    with pytest.raises(JournalError, match=said):
+        rebuild(forged(path, experiment={"sparkle": True}))
 
 
 def test_from_goes_with_copy(recoil: Recoil) -> None:
