@@ -71,14 +71,17 @@ def escaped(text: str, kept: str = "") -> str:
 _STEERING = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
 
 
-def first_few(names: Sequence[object], most: int) -> str:
+def first_few(names: Sequence[object], most: int, noun: str = "", *, apart: str = ", ") -> str:
     """The first names of a list, and how many more there are.
 
     >>> first_few(["P1", "P2", "P3"], 2), first_few(["P1", "P2"], 2)
     ('P1, P2 and 1 more', 'P1, P2')
+    >>> first_few(["a 1, 2", "b 3, 4", "c 5, 6"], 1, "method", apart="; ")
+    'a 1, 2; and 2 more methods'
     """
-    more = f" and {len(names) - most:,} more" if len(names) > most else ""
-    return ", ".join(map(str, names[:most])) + more
+    shown, more = apart.join(map(str, names[:most])), len(names) - most
+    said = how_many(more, f"more {noun}") if noun else f"{more:,} more"
+    return f"{shown}{';' * (apart == '; ')} and {said}" if more > 0 else shown
 
 
 def how_many(number: int, noun: str) -> str:

@@ -257,6 +257,14 @@ def test_of_several_questions_without_an_answer_each_person_is_told_once() -> No
     assert line.startswith("left out of tests of odd: 2 participants (rule: a test takes who answered")
 
 
+@pytest.mark.parametrize(
+    ("people", "said"), [(100, "P100 (?); "), (101, "P100 (?) and 1 more, all in statistics.json; ")]
+)
+def test_a_long_list_of_people_is_cut_as_any_other(people: int, said: str) -> None:
+    gone = [LeftOut(experiment="odd", participant=f"P{who}", reason="?", rule="r") for who in range(1, people + 1)]
+    assert said in next(exclusion_lines(gone))
+
+
 def test_a_copy_of_a_folder_leaves_out_nobody_and_the_original_stays(tmp_path: Path) -> None:
     results = tmp_path / "results"
     for code in ("P01", "P02"):

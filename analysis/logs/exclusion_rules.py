@@ -40,6 +40,7 @@ from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
 from analysis.stats.arrays import BoolArray
 from analysis.times.own_trials import timed
+from device.messages import first_few
 from experiments.config.door import Model, Seconds, Share
 from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR
@@ -184,10 +185,9 @@ def anticipations(logs: Logs) -> Iterator[str]:
 
 def _anticipated(experiment: str, column: str, codes: pd.Series) -> str:
     people = [f"{who} {count}" for who, count in sorted(codes.astype(str).value_counts(sort=False).items())]
-    more = f" and {len(people) - _NAMED} others" if len(people) > _NAMED else ""
     return (
         f"{experiment}: {len(codes)} anticipations, answers within {ANTICIPATION_S:g} s of the onset "
-        f"({', '.join(people[:_NAMED])}{more}; {column}); they count, and `response_time_min_s = {ANTICIPATION_S:g}` "
+        f"({first_few(people, _NAMED)}; {column}); they count, and `response_time_min_s = {ANTICIPATION_S:g}` "
         "under [trials] in a file for --rules drops them"
     )
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut, by_rule
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
-from device.messages import how_many
+from device.messages import first_few, how_many
 from experiments.study.study import by_code
 
 
@@ -115,12 +115,11 @@ def exclusion_lines(excluded: Iterable[LeftOut]) -> Iterator[str]:
     """
     for some in by_rule(one for one in excluded if not one.file):
         experiment, rule = some[0].experiment, some[0].rule
-        people = [f"{one.participant} ({one.reason})" for one in some]
-        count = how_many(len(people), "participant")
-        if len(people) > _NAMED:
-            people[_NAMED:] = [f"and {len(people) - _NAMED:,} more, all named in statistics.json"]
+        people = first_few([f"{one.participant} ({one.reason})" for one in some], _NAMED)
+        people += ", all in statistics.json" if len(some) > _NAMED else ""
+        count = how_many(len(some), "participant")
         what = f"tests of {experiment}" if rule == IN_NO_TEST else experiment
-        yield f"left out of {what}: {count} (rule: {rule}): {', '.join(people)}; {some[0].remedy}"
+        yield f"left out of {what}: {count} (rule: {rule}): {people}; {some[0].remedy}"
 
 
 _NAMED = 100

@@ -55,6 +55,7 @@ from analysis.summary.design_times import timed_designs
 from analysis.summary.designs import origin_of, summarise
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
+from device.messages import first_few
 from device.words import DIRECTIONS
 
 METHOD_ORDER = ("vibration", "asymmetric-1", "asymmetric-2")
@@ -106,8 +107,7 @@ def _repeated(table: pd.DataFrame) -> Iterator[str]:
     doubled = keys[keys.duplicated()].drop_duplicates().itertuples(index=False)
     shown = [f"{who} {method}" for who, method in doubled]
     if shown:
-        more = f" and {len(shown) - _NAMED} others" if len(shown) > _NAMED else ""
-        yield f"preference: rated more than once, so that the mean counts: {', '.join(shown[:_NAMED])}{more}"
+        yield f"preference: rated more than once, so that the mean counts: {first_few(shown, _NAMED)}"
 
 
 _NAMED = 20

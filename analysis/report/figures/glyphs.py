@@ -16,6 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ft2font import FaceFlags, FT2Font
 from matplotlib.text import Text
 
+from device.messages import first_few
+
 OWN_FONT = "DejaVu Sans"
 _FITTING = ("hei", "gothic", "sans")
 """What fonts are called that look like the figures' own."""
@@ -115,8 +117,7 @@ def _say(undrawn: Iterable[str]) -> None:
     new = sorted(set(undrawn) - _said)
     if new:
         _said.update(new)
-        more = f" and {len(new) - _LETTERS_SAID} more" if len(new) > _LETTERS_SAID else ""
         sys.stderr.write(
-            f"recoil: no font on this machine has the letters {' '.join(new[:_LETTERS_SAID])}{more}; figures show "
+            f"recoil: no font on this machine has the letters {first_few(new, _LETTERS_SAID, apart=' ')}; figures show "
             "codes or escapes instead, tables are whole. Install a font that has them (Chinese: fonts-wqy-microhei)\n"
         )

@@ -17,7 +17,7 @@ from analysis.summary.sections.pairs import pair_sections, pair_sentences
 from analysis.summary.sections.pictures import figure_of
 from analysis.summary.sections.shown_trades import instruction_sentences
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
-from device.messages import how_many
+from device.messages import first_few, how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words, joined_by_and
 
@@ -298,11 +298,9 @@ _SPELLED_OUT = 12
 
 
 def _means(found: DesignSummary, question: QuestionSummary) -> str:
-    cells = question.pictured
-    told = [f"{_condition(found, cell)} {_mean(question, cell)}" for cell in cells[:_SPELLED_OUT]]
-    more = len(cells) - len(told)
+    told = [f"{_condition(found, cell)} {_mean(question, cell)}" for cell in question.pictured]
     alarms = [f"false alarms, {_condition(found, cell)} {_mean(question, cell)}" for cell in question.false_alarms]
-    return "; ".join([", ".join(told) + (f" and {more} more conditions" if more else ""), *alarms])
+    return "; ".join([first_few(told, _SPELLED_OUT, "condition"), *alarms])
 
 
 _WITH_STIMULUS = "trials with a stimulus"

@@ -13,6 +13,7 @@ from analysis.summary.pairs import PairCondition, PairedComparison
 from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.pictures import pairs_figure_of
+from device.messages import first_few
 from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
@@ -34,12 +35,11 @@ def pair_sentences(found: DesignSummary, question: QuestionSummary) -> Iterator[
         if scores.reason:
             yield f"No scores{where}: {scores.reason}."
         elif of is not None:
-            told = ", ".join(
+            told = [
                 f"{_item(found, of, str(one.item))} {apa.number(one.score)} {apa.interval(one.low, one.high)}"
-                for one in scores.scores[:_TOLD]
-            )
-            more = len(scores.scores) - _TOLD
-            yield f"Scores by Bradley and Terry{where} (logits): {told}{f' and {more} more' if more > 0 else ''}."
+                for one in scores.scores
+            ]
+            yield f"Scores by Bradley and Terry{where} (logits): {first_few(told, _TOLD)}."
 
 
 def _section(name: str, asked: str, found: DesignSummary, of: PairedComparison) -> Section:

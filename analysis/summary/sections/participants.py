@@ -14,7 +14,7 @@ from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table
 from analysis.summary.participation import PeopleOfExperiment
 from analysis.summary.results import DesignSummary, Origin, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
-from device.messages import how_many
+from device.messages import first_few, how_many
 
 _NAMED = 12
 """So many lines of who was left out stand on top, and so many people in a line; all are in the appendix."""
@@ -171,12 +171,12 @@ def _is_used(report: ReportData, remark: Problem) -> bool:
 
 def _rule_line(report: ReportData, entries: list[LeftOut]) -> str:
     first = entries[0]
-    people = [f"{entry.participant} ({entry.reason})" for entry in entries[:_NAMED]]
-    people += [f"and {len(entries) - _NAMED:,} more, all in statistics.json"] if len(entries) > _NAMED else []
+    people = first_few([f"{entry.participant} ({entry.reason})" for entry in entries], _NAMED)
+    people += ", all in statistics.json" if len(entries) > _NAMED else ""
     rule = f" Rule: {first.rule}." if first.rule else ""
     remedy = f" Remedy: {first.remedy}." if first.remedy else ""
     count, tests = how_many(len(entries), "participant"), " of tests" if first.rule == IN_NO_TEST else ""
-    return f"{_named(report, first.experiment)}: {count} left out{tests}: {', '.join(people)}.{rule}{remedy}"
+    return f"{_named(report, first.experiment)}: {count} left out{tests}: {people}.{rule}{remedy}"
 
 
 def shown_root(report: ReportData) -> str:

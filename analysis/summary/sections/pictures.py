@@ -33,6 +33,7 @@ from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
 from analysis.summary.sections.delivered import DELIVERED_FIGURE
 from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
 from analysis.times.own_trials import TimeSpread
+from device.messages import first_few
 from experiments.record.tables import is_rated
 
 _SHOT_FIGURE, _RESULTS_FIGURE = "figure-shot", "figure-results"
@@ -182,8 +183,8 @@ def directions_picture(found: DirectionStatistics) -> Picture:
         f"Correct rate on forward and backward shots{_PANELS if sensitive else ''} of {found.people}. "
         f"{_without_backward(found)}{_direction_crowd(found.n)} Dashed lines: guessing{_other_lines(found)}."
     )
-    rates = "; ".join(_rates_words(found, method) for method in found.methods[:_SPELLED_OUT])
-    rates += f"; and {len(found.methods) - _SPELLED_OUT} more methods" if has_many(found) else ""
+    most = _SPELLED_OUT if has_many(found) else len(found.methods)
+    rates = first_few([_rates_words(found, method) for method in found.methods], most, "method", apart="; ")
     what = "mean correct rates" if found.n > 1 else "correct rates"
     alt = f"Dot plot of the {what} with everybody's values and a line at chance, 50 %. {rates}."
     return Picture(stem=_DIRECTIONS_FIGURE, caption=caption, alt=alt)
@@ -238,8 +239,7 @@ def response_times_picture(found: DirectionStatistics) -> Picture | None:
         f"whiskers: 5 and 95 %.{medians}"
     )
     known = [(method, spread) for method, spread in times.methods.items() if spread]
-    spreads = "; ".join(_spread_words(method, spread) for method, spread in known[:_SPELLED_OUT])
-    spreads += f"; and {len(known) - _SPELLED_OUT} more methods" if len(known) > _SPELLED_OUT else ""
+    spreads = first_few([_spread_words(*one) for one in known], _SPELLED_OUT, "method", apart="; ")
     alt = f"Cumulative distributions and box plots of the response times. {spreads}."
     return Picture(stem=_TIMES_FIGURE, caption=caption, alt=alt)
 

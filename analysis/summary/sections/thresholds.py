@@ -16,7 +16,7 @@ from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.pictures import functions_figure_of, tracks_figure_of
 from analysis.summary.thresholds import ConditionFit, Thresholds
-from device.messages import how_many
+from device.messages import first_few, how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import factor_words
 
@@ -42,11 +42,11 @@ def threshold_sentences(found: DesignSummary, question: QuestionSummary) -> Iter
         yield f"No psychometric function: {of.reason}."
     told = [one for one in of.conditions if one.group is not None]
     if told:
-        shown = "; ".join(f"{_condition(found, one.levels)}{_group_words(of, one)}" for one in told[:_TOLD])
-        more = f"; and of {len(told) - _TOLD} more conditions" if len(told) > _TOLD else ""
+        said = [f"{_condition(found, one.levels)}{_group_words(of, one)}" for one in told]
+        shown = first_few(said, _TOLD, "condition", apart="; ")
         over = "people" if of.fitted == of.people else f"{of.fitted:,} of {of.people:,} people"
         interval = " with its 95 % credible interval" if any(map(_has_threshold, told[:_TOLD])) else ""
-        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over {over}{interval}: {shown}{more}."
+        yield f"{_measure(of).capitalize()} in {factor_words(of.factor)}, mean over {over}{interval}: {shown}."
 
 
 def _group_words(of: Thresholds, one: ConditionFit) -> str:
