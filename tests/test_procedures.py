@@ -279,22 +279,23 @@ def test_many_observers_at_once_are_each_their_own() -> None:
 
 @pytest.mark.slow
 @given(some_trials, some.sampled_from(["threshold", "width", "lapse", "guess"]))
-def test_quantiles_are_those_of_the_marginal_with_each_value_spread_over_its_cell(
+def test_a_credible_span_is_that_of_the_marginal_with_each_value_spread_over_its_cell(
     trials: list[tuple[int, bool]], name: str
 ) -> None:
-    known, shares = after(trials), (0.025, 0.25, 0.5, 0.975)
-    found = KNOWN.quantiles(known, name, shares)
+    known = after(trials)
     values, weights = KNOWN.axes[name], KNOWN.marginal(known, name)
     middles = (values[1:] + values[:-1]) / 2
     edges = [2 * values[0] - middles[0], *middles, 2 * values[-1] - middles[-1]]
     assert weights == pytest.approx(
         np.moveaxis(known.reshape(KNOWN.prior.shape), list(KNOWN.axes).index(name), 0).reshape(len(values), -1).sum(-1)
     )
-    assert np.interp(found, edges, [0, *np.cumsum(weights)]) == pytest.approx(shares, abs=1e-9)
-    assert np.all(np.diff(found) >= 0)
+    ends = np.interp([0.025, 0.975], [0, *np.cumsum(weights)], edges)
+    assert posterior.credible_span(values, weights) == pytest.approx(
+        np.diff(ends)[0], abs=1e-6 * (edges[-1] - edges[0])
+    )
 
 
-def test_a_parameter_with_one_value_has_it_as_every_quantile() -> None:
+def test_a_parameter_with_one_value_has_no_span() -> None:
     known = posterior.parameter_grid(
         stimuli=np.array([0.0, 1.0]),
         thresholds=np.array([0.0, 1.0]),
@@ -303,8 +304,11 @@ def test_a_parameter_with_one_value_has_it_as_every_quantile() -> None:
         guesses=np.array([0.5]),
     )
     many = np.broadcast_to(known.start(), (3, *known.shape))
-    assert known.quantiles(many, "width").tolist() == [[2.0] * 3] * 3
-    assert known.quantiles(many, "threshold", (0.5,)).tolist() == [[0.5]] * 3
+    width, threshold = (
+        posterior.credible_span(known.axes[one], known.marginal(many, one)) for one in ("width", "threshold")
+    )
+    assert width.tolist() == [0.0] * 3
+    assert threshold.tolist() == pytest.approx([1.9] * 3)
 
 
 def test_of_stimuli_that_are_alike_the_first_is_taken() -> None:

@@ -59,15 +59,12 @@ class AnswerGrid:
         others = tuple(front + axis for axis in range(self.prior.ndim) if axis != place)
         return np.asarray(posterior.reshape(*posterior.shape[:-2], *self.prior.shape).sum(axis=others))
 
-    def quantiles(self, posterior: Shares, name: str, shares: Sequence[float] = (0.025, 0.5, 0.975)) -> Shares:
-        """The values of a parameter below which it lies with these probabilities: (..., shares).
-
-        A value's weight is spread evenly over its cell, which goes halfway to its neighbours.
-        """
-        return _quantiles(self.axes[name], self.marginal(posterior, name), shares)
-
 
 def _quantiles(values: Shares, weights: Shares, shares: Sequence[float]) -> Shares:
+    """The values of a parameter below which it lies with these probabilities: (..., shares).
+
+    A value's weight is spread evenly over its cell, which goes halfway to its neighbours.
+    """
     if len(values) == 1:
         return np.full((*weights.shape[:-1], len(shares)), values[0])
     middles = (values[1:] + values[:-1]) / 2
