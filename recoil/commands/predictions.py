@@ -8,7 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.core import TyperGroup
 
-from analysis.report import terminal
+from analysis.report.terminal import (
+    AsJsonOption,
+    ColumnsOption,
+    FixedSeedOption,
+    GunConfigOption,
+    IncludeSyntheticOption,
+    WorkersOption,
+    end,
+    in_text,
+    progress,
+    say,
+    say_how_long,
+    show,
+    tracked,
+)
 from device.messages import few_of_each
 
 if TYPE_CHECKING:
@@ -54,14 +68,14 @@ def power(
     studies: SimulatedOption = None,
     target: Annotated[float, typer.Option(help="Power that a design is to reach.")] = 0.8,
     null: NullOption = False,
-    seed: terminal.FixedSeedOption = 1,
+    seed: FixedSeedOption = 1,
     paper: Annotated[str, typer.Option(help="Published numbers whose pattern may recur.")] = "paper",
-    workers: terminal.WorkersOption = None,
+    workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
     shard: ShardOption = None,
     merge: MergeOption = None,
     out: Annotated[Path, typer.Option(help="Folder for power.json, figures and report.")] = Path("results/power"),
-    as_json: terminal.AsJsonOption = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Simulated power and precision: how many people and trials does it take, and what does it cost?
 
@@ -101,8 +115,8 @@ def _of_shard(
     from analysis.predict.power import run as feature
 
     number = feature.shard_number(shard)
-    part, was_there = feature.power_shard(request, number, out, terminal.progress, workers=workers, scheduler=scheduler)
-    terminal.show(part, feature.shard_in_short(part, out, was_there=was_there), as_json)
+    part, was_there = feature.power_shard(request, number, out, progress, workers=workers, scheduler=scheduler)
+    show(part, feature.shard_in_short(part, out, was_there=was_there), as_json)
 
 
 def _of_studies(
@@ -111,10 +125,10 @@ def _of_studies(
     from analysis.predict.power import run as feature
 
     if merge is None:
-        found = feature.power(request, out, terminal.progress, workers, scheduler)
+        found = feature.power(request, out, progress, workers, scheduler)
     else:
         found = feature.merged_power(merge, request, out)
-    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
 def _check_only(ctx: typer.Context, why: str, known: tuple[str, ...]) -> None:
@@ -136,8 +150,8 @@ def _of_threshold(config: str, trials: str | None, people: int | None, seed: int
     from analysis.predict.threshold_plan.run import PEOPLE, TRACK_TRIALS, ThresholdRequest
 
     request = ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, people=people or PEOPLE, seed=seed)
-    found = page.threshold_plan(request, out, terminal.progress)
-    terminal.show(found, f"{terminal.in_text(page.plan_in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    found = page.threshold_plan(request, out, progress)
+    show(found, f"{in_text(page.plan_in_short(found))}\nReport: {out / 'report.html'}", as_json)
 
 
 ConfigOrGunArgument = Annotated[str | None, typer.Argument(help="Config whose gun is meant; else the shipped gun.")]
@@ -165,10 +179,10 @@ def design(
     pulse: PulseOption = None,
     rate_above: RateAboveOption = 5.0,
     grid: GridOption = 40,
-    seed: terminal.FixedSeedOption = 1,
-    workers: terminal.WorkersOption = None,
+    seed: FixedSeedOption = 1,
+    workers: WorkersOption = None,
     out: Annotated[Path, typer.Option(help="Folder for design.json, figures and report.")] = Path("results/design"),
-    as_json: terminal.AsJsonOption = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Which damper, voltage and pulse would be felt best, and where a direction begins to be felt. Predictions."""
     from analysis.predict.design_search import run as feature
@@ -183,10 +197,10 @@ def design(
         grid=grid,
         seed=seed,
     )
-    terminal.say_how_long(feature.search_time_s(request, workers))
-    found = feature.design(request, workers, out, terminal.progress)
-    terminal.show(found, f"{terminal.in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
-    raise terminal.end(exceptions=found.best is None)
+    say_how_long(feature.search_time_s(request, workers))
+    found = feature.design(request, workers, out, progress)
+    show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=found.best is None)
 
 
 class _PerceptUnlessNamed(TyperGroup):
@@ -229,14 +243,14 @@ def percept(
     paper: PaperOption = "paper",
     rates: RatesOption = None,
     trials: TrialsOption = None,
-    gun: terminal.GunConfigOption = "gun",
+    gun: GunConfigOption = "gun",
     spread: SpreadOption = 0.0,
     studies: StudiesOption = None,
-    seed: terminal.FixedSeedOption = 1,
+    seed: FixedSeedOption = 1,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, percept.toml, figures and report.")] = Path(
         "results/fit"
     ),
-    as_json: terminal.AsJsonOption = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The percept fitted to forward rates, what they cannot tell, and studies of it against what else is published."""
     from analysis.predict.fit import percept as feature
@@ -244,9 +258,9 @@ def percept(
     request = feature.PerceptRequest(
         paper=paper, rates=rates, trials=trials, gun=gun, spread=spread, studies=studies, seed=seed
     )
-    found = feature.percept(request, out, terminal.progress)
-    text = "\n".join(map(terminal.in_text, feature.in_short(found)))
-    terminal.show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
+    found = feature.percept(request, out, progress)
+    text = "\n".join(map(in_text, feature.in_short(found)))
+    show(found, f"{text}\nReport: {out / 'report.html'}; for a config: {out / 'percept.toml'}", as_json)
 
 
 @app.command("thresholds")
@@ -257,7 +271,7 @@ def fit_thresholds(
         typer.Option(metavar="MAP.toml", help="Which columns hold level and success; required.", show_default=False),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-thresholds"),
-    as_json: terminal.AsJsonOption = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """Psychometric functions of another program's answers at levels of a stimulus."""
     from analysis.summary import mapped_thresholds as feature
@@ -270,10 +284,10 @@ def fit_thresholds(
         )
     found = feature.mapped_thresholds(answers, columns, out)
     for line in few_of_each([f"left out: {one}" for one in found.problems]):
-        terminal.say(f"recoil: {line}")
-    short = terminal.in_text(feature.thresholds_in_short(found))
-    terminal.show(found, f"{short}\nReport: {out / 'report.html'}", as_json)
-    raise terminal.end(exceptions=bool(found.problems))
+        say(f"recoil: {line}")
+    short = in_text(feature.thresholds_in_short(found))
+    show(found, f"{short}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=bool(found.problems))
 
 
 @app.command()
@@ -285,10 +299,10 @@ def times(
     ] = "none",
     bias: Annotated[bool, typer.Option("--bias/--no-bias", help="Fit the start, or hold it at one half.")] = True,
     profile: Annotated[bool, typer.Option("--profile", help="Likelihood intervals as well; slower.")] = False,
-    columns: terminal.ColumnsOption = None,
-    include_synthetic: terminal.IncludeSyntheticOption = False,
+    columns: ColumnsOption = None,
+    include_synthetic: IncludeSyntheticOption = False,
     out: Annotated[Path, typer.Option(help="Folder for fit.json, figure and report.")] = Path("results/fit-times"),
-    as_json: terminal.AsJsonOption = False,
+    as_json: AsJsonOption = False,
 ) -> None:
     """The diffusion model (drift, boundary, start, non-decision time) fitted to people's own response times."""
     from analysis.predict.fit import times as feature
@@ -301,10 +315,10 @@ def times(
         bias=bias,
         profiled=profile,
     )
-    done = feature.times(request, out, terminal.tracked, terminal.progress)
+    done = feature.times(request, out, tracked, progress)
     missing = [*map(str, done.problems), *feature.left_out(done.fit)]
     for line in few_of_each([*(f"left out: {one}" for one in missing), *map(str, done.remarks)]):
-        terminal.say(f"recoil: {line}")
-    short = terminal.in_text(feature.in_short(done.fit, done.labels))
-    terminal.show(done.fit, f"{short}\nReport: {out / 'report.html'}", as_json)
-    raise terminal.end(exceptions=bool(missing or done.remarks))
+        say(f"recoil: {line}")
+    short = in_text(feature.in_short(done.fit, done.labels))
+    show(done.fit, f"{short}\nReport: {out / 'report.html'}", as_json)
+    raise end(exceptions=bool(missing or done.remarks))
