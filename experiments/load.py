@@ -12,7 +12,7 @@ from device.messages import escaped
 from experiments.config.door import ConfigError, StudyConfig, at_key, load, read_toml, said_of, why_unread
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import DesignConfig
-from experiments.design.limits import check_methods, limits, unchanged_methods
+from experiments.design.limits import check_limits, check_methods, unchanged_methods
 from experiments.design.planned import planned_run, plans_of_groups
 from experiments.record import storage
 from experiments.record.design_columns import columns
@@ -69,8 +69,7 @@ def load_setup(name: str | Path) -> Setup[DesignConfig]:
     by_gun = () if design.below_break_away else unchanged_methods(design)
     if set(by_gun) <= set(setup.gun.methods):
         check_methods(setup.gun, by_gun, path.parent / design.gun)
-    with said_of(path):
-        limits(design, setup.gun)
+    check_limits(setup)
     if not design.synthetic:
         return setup
     people = path.parent / design.synthetic

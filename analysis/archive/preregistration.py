@@ -11,7 +11,6 @@ from analysis.archive.preregistration_page import Planned, page
 from analysis.report.serial import as_json
 from analysis.summary.planned_files import planned_files
 from experiments.clock import Clock
-from experiments.design.limits import check_limits
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.record.provenance import provenance
@@ -77,10 +76,7 @@ def freeze(folder: Path, reason: str, clock: Clock) -> Frozen:
 def _study(folder: Path) -> StudyFolder:
     if not (folder / STUDY_FILE).is_file():
         raise PlaceError(f"{folder}: no study's folder (no {STUDY_FILE} in it); `recoil new STUDY` makes one")
-    study = open_study(folder)
-    for setup in study.setups:
-        check_limits(setup)
-    return study
+    return open_study(folder)
 
 
 def _planned(study: StudyFolder) -> Planned:

@@ -21,7 +21,7 @@ from experiments.config.door import ConfigError, at_key
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.language import DRIVEN, INTERVAL_NAMES, NO, shown_level
-from experiments.design.limits import ConditionLimits, check_limits, limits
+from experiments.design.limits import ConditionLimits, limits
 from experiments.design.methods_section import methods_section
 from experiments.design.plan import Condition, Plan
 from experiments.design.planned import (
@@ -97,7 +97,6 @@ class DesignCheck:
 def check_design(setup: Setup[DesignConfig], seed: int, codes: Sequence[str]) -> DesignCheck:
     """What a design means. `ConfigError` names what is wrong with it."""
     design = setup.config
-    check_limits(setup)
     plans = dict(zip(codes, _plans(design, seed, codes), strict=True))
     first = next(iter(plans.values()))
     planned = planned_run(design, first, setup.gun)
