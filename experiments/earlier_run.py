@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 from collections.abc import Iterator
@@ -16,9 +17,17 @@ from experiments.clock import Clock, date_text
 from experiments.config.door import ConfigError
 from experiments.design.plan import Plan
 from experiments.design.shown_texts import setup_in
-from experiments.record.journal import Contents, JournalError, ShownLanguage, begun, hold_journal, read_journal
+from experiments.record.journal import (
+    Contents,
+    JournalError,
+    ShownLanguage,
+    begun,
+    hold_journal,
+    journal_bytes,
+    read_journal,
+)
 from experiments.record.journal import head as journal_head
-from experiments.record.replay import history, last_word_on_gun
+from experiments.record.replay import history, is_shot, last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
 from experiments.session.steps import Answered
@@ -271,8 +280,7 @@ def gun_felt_last(contents: Contents) -> Identity | None:
     last = gun = contents.head.gun
     for record in contents.records:
         gun = record.gun or gun
-        said = record.body.get("kind") if record.kind == "outcome" and isinstance(record.body, dict) else record.kind
-        if said in ("fired", "presented", "shot"):
+        if is_shot(record):
             last = gun
     return last
 
@@ -348,38 +356,49 @@ def begun_language(request: RunRequest, code: str) -> Language:
         raise NotAsItBegan(_journal_of(request), why, "--catalogues DIR") from error
 
 
-LOOKED_BACK = 20
-"""So many journals, the last that were written, are looked at for the run before on a gun."""
+LOOKED_BACK = 1000
+"""So many journals, the last that were written, are looked at for what came before on a gun."""
+_OF_GUN = 20
+"""So many of them, that name the gun, are read."""
 
 
 def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
-    """Whether the last that a participant had in their hand ended by an emergency stop, or the last run on the gun.
+    """Whether the last that a participant had in their hand ended by an emergency stop, or the last on the gun.
 
-    Practices and runs set aside are such too. What is done next begins with a test shot, then. `before`: what their own
-    journal holds, where they go on.
+    Practices and runs set aside are such too, and so is a run that began with the same debt and ended before it was
+    paid. What is done next begins with a test shot, then. `before`: what their own journal holds, where they go on.
     """
-    last = ("", False) if before is None else last_word_on_gun(before)
+    own = [] if before is None else [before]
     for path in where.folder.glob("*_journal*.jsonl"):
         with suppress(JournalError):  # one that cannot be read is named where it is to be used
-            last = max(last, last if path == where.journal else last_word_on_gun(read_journal(path)))
-    return last[1] or (not is_simulated(gun) and _is_halted(gun, where))
+            own += [] if path == where.journal else [read_journal(path)]
+    if max(map(last_word_on_gun, own), default=("", False))[1]:
+        return True
+    return not is_simulated(gun) and max(_words_on(gun, where, before), default=("", False))[1]
 
 
-def _is_halted(gun: str, where: Place) -> bool:
-    """Whether the run before on a gun ended by an emergency stop: it may have been for a fault of the gun's."""
+def _words_on(gun: str, where: Place, before: Contents | None) -> Iterator[tuple[str, bool]]:
+    """The last word on a gun of each run that had it: a stop may have been for a fault of the gun's."""
+    if before is not None:
+        yield last_word_on_gun(before, gun)
+    serials, found = _serials(gun), 0
     for path in nlargest(LOOKED_BACK, where.results.glob("sub-*/*_journal*.jsonl"), key=_written_ns):
         with suppress(JournalError):
-            if path != where.journal and gun in _guns(contents := read_journal(path)):
-                return last_word_on_gun(contents)[1]
-    return False
+            if path != where.journal and any(map(journal_bytes(path).__contains__, serials)):
+                yield last_word_on_gun(read_journal(path), gun)
+                found += 1
+        if found == _OF_GUN:
+            return
+
+
+def _serials(gun: str) -> list[bytes]:
+    """How a journal may hold the serial number of a gun of this name, quickly found: what stands behind a colon."""
+    parts = gun.split(":")
+    found = [":".join(parts[first:]) for first in range(1, len(parts))] or [gun]
+    return [b'"serial":' + json.dumps(one, ensure_ascii=False).encode() for one in found]
 
 
 def _written_ns(path: Path) -> int:
     with suppress(OSError):  # another console has just set it aside
         return path.stat().st_mtime_ns
     return 0
-
-
-def _guns(contents: Contents) -> set[str]:
-    """The guns of a run: that of its beginning, and those that it was resumed on."""
-    return {record.gun.name for record in contents.records if record.gun is not None}

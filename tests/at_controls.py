@@ -6,6 +6,7 @@ What the run tells is drawn when the test says so; keys go down and up when it s
 from __future__ import annotations
 
 import csv
+import itertools
 import queue
 import re
 import threading
@@ -75,13 +76,15 @@ GUARD_S: float = DIRECTION.config.console.guard_s
 class OwnClock:
     """A clock that goes on when the test says so, and by itself while a gun gets ready: nothing there is timed.
 
-    `idle` is set while the run waits on it.
+    `idle` is set while the run waits on it. What is begun later has a later date.
     """
 
     name = "test"
+    _hours = itertools.count()
 
     def __init__(self) -> None:
         self._now_s = 1000.0
+        self._began_s = 1_790_000_000 + 3600 * next(self._hours)
         self._lock = threading.Lock()
         self.idle = threading.Event()
         self._timed = False
@@ -91,7 +94,7 @@ class OwnClock:
         return self._now_s
 
     def utc(self) -> str:
-        return datetime.fromtimestamp(1_790_000_000 + self._now_s, UTC).isoformat(timespec="microseconds")
+        return datetime.fromtimestamp(self._began_s + self._now_s, UTC).isoformat(timespec="microseconds")
 
     def go_on_after(self, utc: str) -> None:
         pass

@@ -1184,7 +1184,7 @@ def test_what_a_participant_does_after_an_emergency_stop_begins_with_a_test_shot
         sitting.clock.skip(3600.0)
         sitting.to(S.PREPARING)
         assert sitting.gun.words.count("rendered") == 1
-        assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * 2
+        assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE]
     journal.rename(journal.with_name("sub-P01_task-direction_journal.aside-3.jsonl"))
     with sat(DIRECTION, tmp_path) as sitting:  # a test shot is the last word by now
         assert sitting.position.base in (S.SETTING, S.PREPARING)
@@ -1209,6 +1209,38 @@ def test_the_next_participant_on_the_same_gun_begins_with_a_test_shot(
         assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * owed
     (tmp_path / "sub-P01").rename(tmp_path / "sub-P03")
     with sat(DIRECTION, tmp_path) as sitting:  # a test shot was made, or another gun was used
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+
+
+def test_a_gun_owes_its_test_shot_until_that_is_fired_on_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a run that ends before it, nor a test shot on the gun that was taken instead, pays it."""
+
+    def on(serial: str) -> None:
+        identity = Identity(model="shaker", version="2", serial=serial)
+        monkeypatch.setattr(WatchedGun, "identify", lambda _: identity, raising=False)
+
+    def next_one(code: str) -> None:
+        (tmp_path / "sub-P01").rename(tmp_path / f"sub-{code}")
+
+    on("A:1")
+    with sat_at(S.HALTED, tmp_path) as sitting:
+        sitting.press("Q")
+    on("B")
+    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
+        assert sitting.state is S.REARMING
+        sitting.to(S.PREPARING)
+        assert sitting.gun.words.count("rendered") == 1
+    next_one("P02")
+    on("A:1")
+    with sat(DIRECTION, tmp_path) as sitting:  # it ends before the test shot
+        assert sitting.state is S.REARMING
+    next_one("P03")
+    with sat(DIRECTION, tmp_path) as sitting:
+        assert sitting.state is S.REARMING
+        sitting.to(S.PREPARING)
+        assert sitting.gun.words.count("rendered") == 1
+    next_one("P04")
+    with sat(DIRECTION, tmp_path) as sitting:
         assert sitting.position.base in (S.SETTING, S.PREPARING)
 
 

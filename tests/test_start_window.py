@@ -316,7 +316,7 @@ def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_fir
     monkeypatch.setattr(live, "run_live", stops)
     live.lab_day(request, (), lambda *_: nullcontext())
     assert f"P01 stopped: {reason}." in told[1]
-    assert told[1].endswith("Whatever they do next begins with a test shot.") is owed
+    assert told[1].endswith("begins with a test shot, and so does the next run on that gun.") is owed
 
 
 def test_f12_is_said_to_be_heard_where_nothing_is_armed(opened: Open) -> None:

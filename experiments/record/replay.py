@@ -9,7 +9,7 @@ from experiments.design.plan import Trial
 from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
 from experiments.session.history import GrowingHistory, History, asked_before
-from experiments.session.remarks import OF_HALT, REMARK, EntryCorrected, Remark, TestShot
+from experiments.session.remarks import HALTED_BEFORE, OF_HALT, REMARK, EntryCorrected, Noted, Remark, TestShot
 from experiments.session.states import EMERGENCY
 from experiments.tasks.questions import AnswerValue
 
@@ -27,19 +27,31 @@ class RunPosition:
     halted: bool = False
 
 
-def last_word_on_gun(contents: Contents) -> tuple[str, bool]:
+def last_word_on_gun(contents: Contents, gun: str | None = None) -> tuple[str, bool]:
     """When an emergency stop or a test shot after one is on record last, and whether it is the stop; "" if none is.
 
-    The stop is its record, its reason or, where the disk took neither, why the run stopped.
+    The stop is its record, its reason, that a test shot was owed before or, where the disk took none of them, why the
+    run stopped. Without any, a shot says that none was owed. `gun`: the word on this one alone, by its name.
     """
-    last = "", False
+    last, fired, on = ("", False), "", ""
     for line in contents.records:
+        on = on if line.gun is None else line.gun.name
+        if gun is not None and on != gun:
+            continue
         word = _remark(contents, line) if line.kind == "remark" else None
-        if isinstance(word, OF_HALT) or (line.kind == "stopped" and line.reason == EMERGENCY):
+        owed = isinstance(word, OF_HALT) or (isinstance(word, Noted) and word.text == HALTED_BEFORE)
+        if owed or (line.kind == "stopped" and line.reason == EMERGENCY):
             last = line.utc, True
         elif isinstance(word, TestShot) and not word.cause:
             last = line.utc, False
-    return last
+        fired = line.utc if is_shot(line) else fired
+    return last if last[0] else (fired, False)
+
+
+def is_shot(line: Record) -> bool:
+    """Whether a record says that the gun fired at the participant."""
+    said = line.body.get("kind") if line.kind == "outcome" and isinstance(line.body, dict) else line.kind
+    return said in ("fired", "presented", "shot")
 
 
 def history(contents: Contents) -> History:

@@ -159,8 +159,10 @@ def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
 def _stopped(choice: RunRequest, reason: str) -> str:
     if choice.training:
         return phrase("The training stopped: {reason}.", reason=reason)
-    halted = phrase("Whatever they do next begins with a test shot.") if reason.startswith(EMERGENCY) else ""
-    return " ".join(filter(None, (_stopped_at(choice, reason), halted)))
+    if not reason.startswith(EMERGENCY):
+        return _stopped_at(choice, reason)
+    owed = phrase("Whatever they do next begins with a test shot, and so does the next run on that gun.")
+    return f"{_stopped_at(choice, reason)} {owed}"
 
 
 def _stopped_at(choice: RunRequest, reason: str) -> str:
