@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from device import Gun, Identity
 from experiments.catalogues.catalogue import ENGLISH, Language, language
+from experiments.catalogues.messages import placeholders
 from experiments.clock import Clock, date_text
 from experiments.config.door import ConfigError
 from experiments.design.plan import Plan
@@ -344,16 +345,30 @@ def gone_on_with(request: RunRequest) -> RunRequest:
     if request.again != "resume":
         return request
     began = language_begun_in(request)
-    return replace(request, language=ENGLISH if began is None else begun_language(request, began.code))
+    return replace(request, language=ENGLISH if began is None else begun_language(request, began))
 
 
-def begun_language(request: RunRequest, code: str) -> Language:
-    """The language that a run began in. `NotAsItBegan`, if its catalogue is not there any more."""
+def begun_language(request: RunRequest, began: ShownLanguage) -> Language:
+    """The language that a run began in, in the words that it began in, whatever its catalogue has by now.
+
+    `NotAsItBegan`, if its catalogue is not there any more, with what the journal does not hold.
+    """
     try:
-        return language(code, request.catalogues, asked=f"the run began in {code}")
+        now = language(began.code, request.catalogues, asked=f"the run began in {began.code}")
     except ConfigError as error:
         why = f"{error}; resume with the catalogue it began with"
         raise NotAsItBegan(_journal_of(request), why, "--catalogues DIR") from error
+    known = asdict(now.messages)
+    shown = {
+        name: text
+        for name, text in began.messages.items()
+        if name in known and placeholders(text) == placeholders(known[name])
+    }
+    return replace(
+        now,
+        messages=replace(now.messages, **shown),
+        look_up=lambda text: began.texts.get(text) or now.look_up(text),
+    )
 
 
 LOOKED_BACK = 1000

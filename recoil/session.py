@@ -137,7 +137,7 @@ def _language(request: RunRequest, wanted: LanguageOptions) -> Language:
     began = language_begun_in(request) if request.again == "resume" else None
     if began is None or wanted.code not in (None, began.code):
         return wanted.language(request.setup)
-    found = begun_language(replace(request, catalogues=wanted.folder), began.code)
+    found = begun_language(replace(request, catalogues=wanted.folder), began)
     if began.checked_by:
         check_allowed(found, unchecked=wanted.unchecked)
     return found

@@ -6,7 +6,7 @@ import json
 import os
 import re
 import runpy
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from gettext import NullTranslations
 from io import StringIO
 from pathlib import Path
@@ -575,6 +575,34 @@ def test_a_run_goes_on_in_the_words_that_it_began_in(tmp_path, folder):
         carried_out(tmp_path, other, again="resume")
     checked = replace(long, checked_by="somebody else")  # the words are what counts
     assert read_journal(carried_out(tmp_path, checked, again="resume").journal).finished
+
+
+def test_a_run_goes_on_in_its_own_words_though_its_catalogue_has_others_by_now(tmp_path, folder):
+    """As after an update that words a message anew, or where somebody mended the catalogue."""
+    place = carried_out(tmp_path, language(LONG, folder))
+    cut(place)
+    began = read_journal(place.journal).head.language
+    text = next(iter(began.texts))
+    changed = {ENGLISH.messages.wait: "Hold on.", text: "Something else"}
+    own = tmp_path / "own"
+    write_catalogue(own, LONG, lambda one: changed.get(one) or SAID[LONG](one), HEADS[LONG])
+    assert language(LONG, own).messages.wait == "Hold on."
+    going_on = gone_on_with(replace(resuming(tmp_path), catalogues=own))
+    assert asdict(going_on.language.messages) == began.messages
+    assert going_on.language.look_up(text) == began.texts[text]
+    assert going_on.language.look_up("Somebody else's text") == language(LONG, own).look_up("Somebody else's text")
+    run_session(resuming(tmp_path), LanguageOptions(folder=own))
+    assert read_journal(place.journal).finished
+
+
+def test_a_message_that_names_something_new_is_said_as_it_is_now(tmp_path, folder):
+    place = carried_out(tmp_path, language(LONG, folder))
+    cut(place)
+    head, *rest = raw(place.journal)
+    head["language"]["messages"]["place"] = "Item {number}"  # it names the number of trials by now
+    place.journal.write_bytes(forged([head, *rest]))
+    going_on = gone_on_with(replace(resuming(tmp_path), catalogues=folder))
+    assert going_on.language.messages.place == language(LONG, folder).messages.place
 
 
 def test_a_look_crosses_the_wire_with_its_messages(folder):
