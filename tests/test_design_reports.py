@@ -344,6 +344,18 @@ def test_a_condition_has_the_false_alarms_of_its_own_session_and_not_of_all():
     design = detection(VOLTS | {"method": {"levels": ["a", "b"]}}, order={"session": ["method"]})
     (announced,) = sentences_of_tests(design)
     assert "of each condition, with the false alarms of the same method;" in announced
+    design = detection(VOLTS | {"method": {"levels": ["a", "b"]}}, order={"set": ["method"], "sets": 2})
+    assert "of each condition, with the false alarms of the same method;" in next(sentences_of_tests(design))
+
+
+def test_the_mean_of_those_who_had_catch_trials_there_says_that_it_is_of_them_alone():
+    table = by_session({**SAYS_YES_TO_THE_OTHER, ("P3", "a"): (7, 2), ("P3", "b"): (7, 2)})
+    without = (table["participant_id"] == "P3") & (table["method"] == "b") & (table["stimulus"] == 0)
+    found, tests = by_method(table[~without])
+    assert (tests["d_prime_mean", "method a"].n, tests["d_prime_mean", "method b"].n) == (None, 2)
+    told = {row[1]: row[-2] for row in tables_of(found)[1].rows if row[0] == "d′, mean of participants"}
+    assert told["b"].endswith("; of 2 participants with catch trials there")
+    assert "participants with" not in told["a"]
 
 
 def test_a_condition_without_catch_trials_of_its_own_has_the_false_alarms_of_all_and_the_table_says_so():

@@ -143,7 +143,7 @@ def _false_alarms(design: DesignConfig, question: QuestionConfig) -> str:
     """Which catch trials a condition of a detection is held against."""
     if question.correct != "stimulus":
         return ""
-    same = [name for name in varied(design) if name in (*design.between, *design.order.session)]
+    same = [name for name in varied(design) if name in design.factors and name not in design.varying]
     return f", with the false alarms of {f'the same {joined_by_and(same)}' if same else 'all catch trials'}"
 
 

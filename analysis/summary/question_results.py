@@ -40,7 +40,8 @@ class DesignTest:
     """A test or an estimate. `statistic` is what `name` says; `None` with a `reason` where it could not be made.
 
     `p_gg`: of an ANOVA of more than two levels within people, corrected by `epsilon` (Greenhouse and Geisser). `n` and
-    `kendall_w`: of Friedman's test, of how many people it is, and how much they agree, 0 to 1.
+    `kendall_w`: of Friedman's test, of how many people it is, and how much they agree, 0 to 1; `n` of a mean d′: of how
+    many who had catch trials there, if somebody had none.
     """
 
     name: str

@@ -80,6 +80,7 @@ def _mean_of_people(name: str, signal: pd.DataFrame, noise: pd.DataFrame) -> Ite
         effect=name,
         statistic=float(own.mean()),
         df=(len(own) - 1,),
+        n=len(own) if len(own) < signal["participant_id"].nunique() else None,
         ci_low=float(own.mean()) - half if half else None,
         ci_high=float(own.mean()) + half if half else None,
     )

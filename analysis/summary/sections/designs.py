@@ -426,6 +426,8 @@ def _test(found: DesignSummary, question: QuestionSummary, test: DesignTest) -> 
     else:
         more = apa.NO_NUMBER if test.size is None else f"η²_G = {apa.below_one(test.size)}"
         more += f"; {_sphericity(test)}" if test.p_gg is not None else ""
+    if test.name == "d_prime_mean" and test.n is not None:
+        more += f"; of {how_many(test.n, 'participant')} with catch trials there"
     p = apa.NO_NUMBER if test.p is None else apa.p_cell(test.p)
     return (_TESTS.get(test.name, test.name), _effect(found, test), apa.number(test.statistic), df, p, more)
 
