@@ -127,17 +127,24 @@ def enrolment_refusal(
 
 
 _LEADING_ZEROS = re.compile(r"(?<![0-9])0+(?=[0-9])")
+_READ_ALIKE = str.maketrans("oil", "011")
 
 
 def look_alike(participant_id: str, known: Iterable[str]) -> str:
-    """The known code from which a new one differs by leading zeros or case alone; empty if there is none.
+    """The known code from which a new one differs by case, leading zeros or letters read as digits alone; else empty.
 
     >>> look_alike("P1", ["P01", "P10"]), look_alike("P10", ["P01", "P1"]), look_alike("P1", ["P1", "P01"])
     ('P01', '', '')
+    >>> look_alike("PO1", ["P01"]), look_alike("Pl2", ["P12"])
+    ('P01', 'P12')
     """
-    known, plain = tuple(known), _LEADING_ZEROS.sub("", participant_id).lower()
-    alike = (code for code in known if _LEADING_ZEROS.sub("", code).lower() == plain)
-    return "" if participant_id in known else next(alike, "")
+    known, plain = tuple(known), _plain(participant_id)
+    return "" if participant_id in known else next((code for code in known if _plain(code) == plain), "")
+
+
+def _plain(code: str) -> str:
+    """A code as it is heard and read: small letters, digits for letters that look like them, no leading zeros."""
+    return _LEADING_ZEROS.sub("", code.lower().translate(_READ_ALIKE))
 
 
 def fact_text(name: str) -> str:
