@@ -20,7 +20,7 @@ from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.messages import BETWEEN, Focused, NoiseEnded, NoiseIs, line
+from experiments.screens.participant.messages import BETWEEN, Focused, NoiseBroken, NoiseEnded, NoiseIs, line
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
@@ -202,6 +202,24 @@ def test_noise_begins_again_with_the_participants_screen_also_if_the_run_has_gon
     finally:
         first.close()
         again.close()
+
+
+def test_noise_that_may_have_broken_off_is_said_and_on_record(tmp_path: Path) -> None:
+    word = line(NoiseBroken(stood_still_s=1.26)).decode().strip()
+    program = f"import sys; sys.stdin.readline(); print({word!r}, flush=True); sys.stdin.read()"
+    link = ParticipantLink.start(command=(sys.executable, "-c", program))
+    told: list[Message] = []
+    try:
+        with sat(SETUP, tmp_path) as sitting:
+            beside(link).begin(sitting.live, told.append)
+            link.show("go")
+            wait_for(lambda: len(notes(sitting.live)) > 1)
+            broken = "Masking noise may have broken off for 1.3 s: the program that plays it stood still."
+            assert notes(sitting.live) == ["Masking noise plays.", broken]
+    finally:
+        link.close()
+    assert [one.text for one in told if isinstance(one, Trouble)] == [broken]
+    assert not any(one.noise_off for one in told if isinstance(one, ParticipantSeen))
 
 
 PLAYS = """

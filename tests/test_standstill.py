@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+from types import SimpleNamespace
+
 import pytest
 
+from experiments.screens.participant import app, messages
 from experiments.screens.participant.standstill import LONGEST_STANDSTILL_S, Standstills
 
 
@@ -58,3 +62,45 @@ def test_a_standstill_that_nobody_has_seen_the_end_of_counts() -> None:
 def test_who_looks_often_enough_missed_nothing() -> None:
     found, _ = looked_at(*(0.05 * count for count in range(1, 20)))
     assert {found.around_s(0.1 * count) for count in range(10)} == {0.0}
+
+
+class Playing:
+    """Noise that takes two seconds to begin, and plays from then on."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock, self.plays = clock, False
+
+    def turn(self, asked: messages.Noise) -> messages.NoiseIs:
+        self._clock.now_s, self.plays = self._clock.now_s + 2.0, asked.on
+        return messages.NoiseIs(on=asked.on, message="", ask=asked.ask)
+
+    def ended(self) -> None:
+        return None
+
+    def stop(self) -> None:
+        self.plays = False
+
+
+@pytest.mark.parametrize(("on", "said"), [(True, [1.5]), (False, [])])
+def test_a_standstill_while_noise_plays_is_said_once_and_what_it_took_to_begin_is_none(
+    on: bool, said: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard = list[object]()
+    words = iter([messages.Noise(on=on, level=0.3), *[None] * 10, messages.CloseScreen()])
+    found, clock = looked_at(0.01)
+    passed_s = itertools.chain([[0.1] * 15] * 2, [[1.5]], itertools.repeat([0.1] * 15))  # in the third nobody looks
+
+    def step() -> None:
+        for some_s in next(passed_s):
+            clock.now_s += some_s
+            found.look()
+
+    page = SimpleNamespace(draft=lambda: None, outcome=lambda: None)
+    toolkit = SimpleNamespace(now=clock.now, key_epoch_s=0.0, keyboard=SimpleNamespace(Keyboard=SimpleNamespace))
+    stage = SimpleNamespace(toolkit=toolkit, step=step, unasked=[], page=page, close=lambda: None)
+    monkeypatch.setattr(app, "Standstills", lambda _: found)
+    monkeypatch.setattr(app, "MaskingNoise", lambda: Playing(clock))
+    monkeypatch.setattr(app.KeyPresses, "poll", lambda _: None)
+    app.App(stage, SimpleNamespace(word=lambda: next(words), say=heard.append)).serve()  # type: ignore[arg-type]
+    broken = [round(word.stood_still_s, 6) for word in heard if isinstance(word, messages.NoiseBroken)]
+    assert broken == said

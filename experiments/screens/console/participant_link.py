@@ -174,6 +174,19 @@ class ParticipantSide:
         if self._noise is not None and self._noise.on:
             self._noise_is(messages.NoiseIs(on=False, message=why))
 
+    def _noise_changes(self, word: messages.NoiseEnded | messages.NoiseBroken) -> None:
+        """Noise has ended, or may have been silent for a while: said, and on record."""
+        if isinstance(word, messages.NoiseEnded):
+            self._noise_ends(word.message)
+            return
+        text = phrase(
+            "Masking noise may have broken off for {seconds} s: the program that plays it stood still.",
+            seconds=f"{word.stood_still_s:.1f}",
+        )
+        self._tell(Trouble(text=text))
+        if self._live is not None:
+            self._live.remark(Noted(trial=None, text=text))
+
     @property
     def asking(self) -> bool:
         """Whether the participant is asked something at this moment."""
@@ -350,8 +363,8 @@ class ParticipantSide:
                 self._see()
             case messages.Draft():
                 self._draft = word
-            case messages.NoiseEnded():
-                self._noise_ends(word.message)
+            case messages.NoiseEnded() | messages.NoiseBroken():
+                self._noise_changes(word)
             case messages.ChoiceGiven() if self._live is not None and self._live.position.entered_for(word.step):
                 at_s = self._live.clock.now()
                 late = events.ParticipantKey(

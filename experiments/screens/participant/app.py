@@ -167,13 +167,15 @@ class App:
             self._wire.say(draft)
 
     def _beat(self) -> None:
-        """Say each second that the window works, and that the noise has ended if it has."""
-        now_s = self._stage.toolkit.now()
-        if now_s - self._beat_s >= _BEAT_S:
+        """Say each second that the window works, and of the noise if it has ended, or may have broken off meanwhile."""
+        since_s, now_s = self._beat_s, self._stage.toolkit.now()
+        if now_s - since_s >= _BEAT_S:
             self._beat_s = now_s
             self._wire.say(messages.Beat())
             if (ended := self._noise.ended()) is not None:
                 self._wire.say(ended)
+            elif self._noise.plays and (stood_s := self._standstills.within_s(since_s, now_s)):
+                self._wire.say(messages.NoiseBroken(stood_still_s=stood_s))
 
     def _obey(self, word: messages.ToParticipant) -> None:
         self._told = word.tell if isinstance(word, messages.Show) else ()
@@ -192,6 +194,7 @@ class App:
             case messages.Noise():
                 self._wire.say(messages.Beat(within_s=messages.NOISE_S))
                 self._wire.say(self._noise.turn(word))
+                self._beat_s = self._stage.toolkit.now()  # to begin took its time, in which nothing played yet
 
     def _drafts_of(self, word: messages.AskRating | messages.AskDescription) -> Drafts:
         """What is given as a pause begins is not taken, and asked for again: it is there still."""

@@ -238,6 +238,14 @@ class NoiseEnded:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseBroken:
+    """The program that plays the noise stood still for so long, and the noise may have as well."""
+
+    stood_still_s: float
+    kind: Literal["noise-broken"] = "noise-broken"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScreenFailed:
     """The participant's screen ends, and why."""
 
@@ -246,7 +254,7 @@ class ScreenFailed:
 
 
 ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
-Unasked = EmergencyPressed | Focused | KeyPressed | Draft | NoiseEnded
+Unasked = EmergencyPressed | Focused | KeyPressed | Draft | NoiseEnded | NoiseBroken
 """What the participant's screen says without being asked."""
 Heard = Unasked | ChoiceGiven
 """What nobody waits for: also an answer to a question that was called off."""

@@ -30,6 +30,11 @@ class MaskingNoise:
             return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
         return messages.NoiseIs(on=True, message="", ask=asked.ask)
 
+    @property
+    def plays(self) -> bool:
+        """Whether it is on, and has not been found to have ended."""
+        return self._sound is not None
+
     def ended(self) -> messages.NoiseEnded | None:
         """What is to be said where it was on and ended by itself: a sound device that is gone ends its stream."""
         if self._sound is None or self._sound.stream._sdStream.active:
