@@ -506,6 +506,16 @@ def test_a_figure_of_hits_has_the_false_alarms_beside_them(varied, tmp_path, mon
     assert all(f"{name}, catch trials {apa.percent(share)}" in picture.alt for name, share in said.items())
 
 
+def test_false_alarms_stand_left_of_levels_of_which_one_alone_was_answered_too(tmp_path, monkeypatch):
+    found = summarise(detection(VOLTS), answered({("P1", 6.0): (9, 12), ("P1", None): (3, 12)}))
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, _: drawn.append(figure))
+    figure_design(found, tmp_path / "figure")
+    (axes,) = drawn[0].axes
+    left, right = axes.spines["bottom"].get_bounds()
+    assert axes.get_xticks()[0] < left < axes.get_xticks()[1] < right < axes.get_xlim()[1]
+
+
 @pytest.mark.slow
 def test_many_conditions_have_a_panel_for_each_level_of_a_factor_and_one_scale(tmp_path, monkeypatch):
     factors = {name: {"levels": ["one", "two"]} for name in ("grip", "coat")} | {"method": {"levels": ["a", "b"]}}

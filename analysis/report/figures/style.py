@@ -109,7 +109,7 @@ def left_of(levels: Collection[float]) -> float:
 
 def part_left(axes: Axes, levels: Collection[float]) -> None:
     """End the line below an axis at the levels, so that what stands left of them is none."""
-    span = max(levels) - min(levels)
+    span = (max(levels) - min(levels)) or 2.0
     axes.spines["bottom"].set_bounds(min(levels) - 0.1 * span, max(levels) + 0.07 * span)
 
 
