@@ -309,6 +309,16 @@ def test_the_gun_gives_no_trial_away_that_has_no_stimulus(state: State) -> None:
     assert {progress.gun_text(replace(asked, gun=one)) for one in later} == {("Gun: disarmed\ncoil 20 °C", "good")}
 
 
+def test_the_method_of_the_others_gives_no_catch_trial_away() -> None:
+    setup = direction_with(("vibration", "asymmetric-1"), 1, 1)
+    here = seen(setup, Position(step=prepare(plan_of(setup).trials[0])))
+    trial = here.here
+    assert view.method_text(here.about, trial)
+    left_out = replace(trial, trial=99, levels=(), catch=True)
+    beside = replace(here.about.plan, trials=(*here.about.plan.trials, left_out))
+    assert view.method_text(replace(here.about, plan=beside), trial) == ""
+
+
 def test_the_count_of_a_track_gives_no_catch_trial_away() -> None:
     trials = [replace(trial, catch=False, track=1) for trial in plan_of(DIRECTION).trials]
     plan = replace(plan_of(DIRECTION), trials=tuple(trials))

@@ -68,6 +68,10 @@ def asked(**keys):
         ({"order": {"trials": "fixed", "longest_run": {"method": 2}}}, "has its own order"),
         ({"order": {"trials": "fixed"}, "trial": {"catch": 2}}, "would be known"),
         (
+            {"factors": ONE | {"grip": {"levels": ["x", "y"]}}, "trial": {"catch": 2}},
+            "trial.catch = 2: grip is set by hand from trial to trial, and catch trials, which have none, would be",
+        ),
+        (
             {
                 "factors": ONE | {"voltage_V": {"levels": {"a": [1.0]}, "within": "method"}},
                 "order": {"set": ["method"]},

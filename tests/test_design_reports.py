@@ -369,12 +369,12 @@ def test_a_condition_without_catch_trials_of_its_own_has_the_false_alarms_of_all
 
 
 def test_a_condition_of_several_factors_is_called_by_its_levels_beside_its_d_prime():
-    ways = VOLTS | {"direction": {"levels": ["forward", "backward"]}}
+    pulses = VOLTS | {"pulse_s": {"levels": [0.003, 0.005]}}
     table = answered(SAID)
-    way = pd.Series(["forward", "backward"] * (len(table) // 2)).where(table["stimulus"] == 1)
-    (_, by_test) = tables_of(summarise(detection(ways), table.assign(direction=way)))
+    pulse = pd.Series([0.003, 0.005] * (len(table) // 2)).where(table["stimulus"] == 1)
+    (_, by_test) = tables_of(summarise(detection(pulses), table.assign(pulse_s=pulse)))
     of = list(dict.fromkeys(row[1] for row in by_test.rows if row[0] == "d′, pooled"))
-    assert of == ["all conditions", "6 V, forward", "6 V, backward", "10 V, forward", "10 V, backward"]  # as designed
+    assert of == ["all conditions", "6 V, 0.003 s", "6 V, 0.005 s", "10 V, 0.003 s", "10 V, 0.005 s"]  # as designed
 
 
 @pytest.mark.slow

@@ -78,6 +78,21 @@ def test_an_interval_without_a_stimulus_is_empty(gun):
     assert (None,) in shots(caught, gun)
 
 
+def test_a_catch_trial_beside_methods_that_vary_is_not_known_by_its_damper(gun):
+    def caught(*methods, **order):
+        return design(factors={"method": {"levels": [*methods]}}, trial={"catch": 2}, order=order)
+
+    with pytest.raises(ConfigError, match="asymmetric-1 has damper off, asymmetric-2 damper on, and catch trials"):
+        limits(caught("asymmetric-1", "asymmetric-2"), gun)
+    limits(caught("asymmetric-1", "asymmetric-2", session=["method"]), gun)
+    methods = dict.fromkeys(("asymmetric-1", "another"), gun.methods["asymmetric-1"])
+    alike = type(gun).model_validate(gun.model_copy(update={"methods": methods}).model_dump())
+    config = caught("asymmetric-1", "another")
+    limits(config, alike)
+    held = {trial.catch: stimuli.settings(config, alike, trial.levels) for trial in plan_of(config, "P01", 1).trials}
+    assert held == dict.fromkeys((False, True), (("damper", "off"),))
+
+
 @pytest.mark.parametrize(
     ("factors", "said"),
     [

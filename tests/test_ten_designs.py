@@ -105,10 +105,16 @@ def test_a_number_for_a_catch_trial_is_the_least_that_may_be_said():
     assert said[True] == 0.000001 < said[False]
 
 
-@pytest.mark.parametrize(("name", "law"), [("preference", "appeal"), ("hurry", "diffusion")])
-def test_a_law_of_what_a_shot_does_is_refused_where_there_is_none(name, law):
+ONE_SHOT = {"kind": "single", "repeat_every_s": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "trial", "blocked"),
+    [("preference", "appeal", ONE_SHOT, ()), ("hurry", "diffusion", {}, ("instruction", "direction"))],
+)
+def test_a_law_of_what_a_shot_does_is_refused_where_there_is_none(name, law, trial, blocked):
     felt = load(SyntheticAnswers, path_of(name).parent / f"synthetic/{name}-felt.toml")
-    design = changed(name, design="own", trial={"catch": 4}, order={"sets": 1}).config
+    design = changed(name, design="own", trial={"catch": 4} | trial, order={"sets": 1, "set": blocked}).config
     with pytest.raises(ConfigError, match=rf"law = '{law}': it says what a shot does, and a catch trial"):
         check_laws(design, felt)
 

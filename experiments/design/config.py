@@ -358,10 +358,23 @@ def _trial_problems(design: DesignConfig) -> Iterator[str]:
     if trial.catch and design.order.trials != "random":
         shown = f"catch trials in an order.trials of {design.order.trials!r} would be known; use random"
         yield f"trial.catch = {trial.catch}: {shown}"
+    for name in _by_hand_between_trials(design) if trial.catch else ():
+        yield (
+            f"trial.catch = {trial.catch}: {name} is set by hand from trial to trial, and catch trials, which have "
+            f"none, would be known; name {name} in order.session or order.set, or take it out"
+        )
     if TRAIN_INTERVAL in design.factors and trial.kind != "train":
         yield f"factors.{TRAIN_INTERVAL} is the interval of a train, but trial.kind is {trial.kind!r}"
     if trial.compare is not None and trial.compare in design.factors:
         yield from _comparison_problems(design, trial.compare, design.factors[trial.compare])
+
+
+def _by_hand_between_trials(design: DesignConfig) -> Iterator[str]:
+    """What the experimenter's hands do otherwise from one trial to the next, dampers of methods apart."""
+    for name in design.varying:
+        by_hand = name not in (*DRIVEN, METHOD_FACTOR, INSTRUCTION_FACTOR, TRAIN_INTERVAL)
+        if by_hand and len(design.factors[name].all_levels) > 1:
+            yield name
 
 
 def _comparison_problems(design: DesignConfig, compare: str, factor: FactorConfig) -> Iterator[str]:

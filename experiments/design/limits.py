@@ -13,9 +13,9 @@ from device.words import Drive, LimitError
 from experiments.config.door import ConfigError, at_key, said_of
 from experiments.config.setup import GunConfig, Setup
 from experiments.design.config import GUN_NUMBERS, DesignConfig
-from experiments.design.language import TRAIN_INTERVAL
+from experiments.design.language import METHOD_FACTOR, TRAIN_INTERVAL
 from experiments.design.plan import Condition
-from experiments.design.stimuli import beyond_limits, settings, shot_cells, shown_cell, stimulus
+from experiments.design.stimuli import beyond_limits, damper, settings, shot_cells, shown_cell, stimulus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,10 +37,11 @@ def limits(design: DesignConfig, gun: GunConfig) -> list[ConditionLimits]:
     """What every cell asks of the gun. `ConfigError`: one is beyond a limit, never comes home, or never moves.
 
     A cell whose magnet never moves is let through by a design that says `below_break_away = true`. `ConfigError`, too,
-    where a hand would have to set what a procedure chooses.
+    where a hand would have to set what a procedure chooses, or what catch trials have not.
     """
     found = [_limits_of(design, gun, levels) for levels in dict.fromkeys(shot_cells(design))]
     _check_hands(design, gun)
+    _check_catch(design, gun)
     return found
 
 
@@ -56,6 +57,19 @@ def _check_hands(design: DesignConfig, gun: GunConfig) -> None:
         raise ConfigError(
             f"factors.{name}.levels: a procedure chooses them after an answer, when hands have set the gun, and "
             f"{cell} has {_hand_words(one)}, {other_cell} {_hand_words(other)}; take levels that are set alike"
+        )
+
+
+def _check_catch(design: DesignConfig, gun: GunConfig) -> None:
+    """A catch trial has no method where that varies from trial to trial: it would be known by the damper."""
+    mixed = design.trial.catch > 0 and METHOD_FACTOR in design.varying
+    by_damper = {damper(gun, method): method for method in design.methods} if mixed else {}
+    if len(by_damper) > 1:
+        (one, method), (other, other_method) = [*by_damper.items()][:2]
+        raise ConfigError(
+            f"factors.method.levels: {method} has {_hand_words(one)}, {other_method} {_hand_words(other)}, and catch "
+            "trials, which have no method, would be known; name method in order.session or order.set, or take methods "
+            "that are set alike"
         )
 
 

@@ -58,11 +58,11 @@ def by_hand(design: DesignConfig) -> tuple[str, ...]:
 def settings(design: DesignConfig, gun: GunConfig, levels: Condition) -> tuple[tuple[str, str], ...]:
     """What is set by hand for a cell, as the experimenter reads it: the method's damper, unless a factor says how.
 
-    Of a method that is not chosen yet it is that of any, as `limits` lets no others through.
+    Of a method that is not chosen yet, or that a catch trial has not, it is that of any: `limits` lets no others by.
     """
     names, method = by_hand(design), dict(levels).get(METHOD_FACTOR)
-    method = design.methods[0] if method == CHOSEN else method
-    held = {} if method is None else dict(damper(gun, str(method)))
+    method = design.methods[0] if method in (CHOSEN, None) else method
+    held = dict(damper(gun, str(method)))
     return tuple((held | {name: design.factors[name].label(level) for name, level in levels if name in names}).items())
 
 

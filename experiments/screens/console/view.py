@@ -198,7 +198,7 @@ def method_code(plan: Plan, trial: Trial) -> str:
 
 def method_text(about: About, trial: Trial) -> str:
     """The method's name where its damper is set by hand, else its code; in brackets, as it stands behind others."""
-    if not trial.method:  # it varies within the trial, or there is no stimulus
+    if not all(other.method for other in about.plan.set_of(trial)):  # it varies within trials, or would tell of others
         return ""
     method = about.setup.gun.methods[trial.method]
     return f" ({method.label if method.damper else method_code(about.plan, trial)})"
