@@ -22,8 +22,6 @@ from analysis.stats.arrays import FloatArray
 BOTH = "both directions alike"
 MARKERS = "os^Dv<>"
 FAINT, SOFT = "#d6d6d6", "#9db8cc"
-FASTEST = 3.0
-"""Times the bound: what is faster is hardly felt, and stands in `design.json` alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +30,16 @@ class Mark:
 
     name: str
     design: DrivePrediction
+
+
+def shown_up_to_Hz(found: DesignSearch) -> float:  # noqa: N802 - the unit ends the name
+    """The rate to which the front reaches the criterion, and no named design or bound lies beyond.
+
+    What is faster stands in `design.json` alone.
+    """
+    reached = [one for one in found.front if one.predicted is not None and one.predicted >= found.critical.level]
+    named = [mark.design for mark in _own_marks(found)] + ([found.best] if found.best else [])
+    return max([found.rate_above_Hz, *(one.shooting_rate_Hz for one in (*reached, *named))])
 
 
 def figure_trade(found: DesignSearch, designs: Designs, path_stem: Path) -> None:
@@ -52,7 +60,7 @@ def figure_trade(found: DesignSearch, designs: Designs, path_stem: Path) -> None
             _point(axes, mark, VERMILION, MARKERS[place % len(MARKERS)], 6.0)
         if best is not None:
             _point(axes, best, ORANGE, "*", 13.0)
-        _scales(axes, bound_Hz, designs)
+        _scales(axes, found, designs)
         where: Any = "outside lower center"
         figure.legend(loc=where, ncols=3, frameon=False, fontsize=8.0)
 
@@ -93,11 +101,12 @@ def _point(axes: Axes, mark: Mark, colour: str, marker: str, size: float) -> Non
     )
 
 
-def _scales(axes: Axes, bound_Hz: float, designs: Designs) -> None:
-    """Rates from below the bound to a few times it."""
+def _scales(axes: Axes, found: DesignSearch, designs: Designs) -> None:
+    """Rates from below the bound to the last that is shown."""
+    bound_Hz = found.rate_above_Hz
     rates_Hz = designs.shooting_rate_Hz[designs.proposable & np.isfinite(designs.predicted)]
     slowest = float(rates_Hz.min()) if rates_Hz.size else 0.0
-    axes.set_xlim(max(0.0, min(slowest, bound_Hz) - 0.2), FASTEST * bound_Hz)
+    axes.set_xlim(max(0.0, min(slowest, bound_Hz) - 0.2), 1.03 * shown_up_to_Hz(found))
     axes.set_ylim(48.0, 101.0)
     axes.set_xlabel("highest shooting rate [Hz]")
     axes.set_ylabel("right about a forward shot,\npredicted [%]")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.predict.design_search.choice import ABOVE, BELOW, REACHED, Designs
-from analysis.predict.design_search.figures import BOTH, FASTEST, figure_critical, figure_maps, figure_trade
+from analysis.predict.design_search.figures import BOTH, figure_critical, figure_maps, figure_trade, shown_up_to_Hz
 from analysis.predict.design_search.results import (
     BestDesign,
     Critical,
@@ -231,11 +231,12 @@ def _cells(one: DrivePrediction) -> tuple[str, ...]:
 def _trade(found: DesignSearch, designs: Designs, figures: Path) -> Section:
     front = found.front
     figure_trade(found, designs, figures / "trade")
-    fastest_Hz = FASTEST * found.rate_above_Hz
+    fastest_Hz = shown_up_to_Hz(found)
     rows = tuple(_cells(one) for one in _spread(front, fastest_Hz))
     beyond = any(one.shooting_rate_Hz > fastest_Hz for one in front)
-    up_to = f" up to {fastest_Hz:g} Hz" if beyond else ""
-    faster = f" Shown is what shoots at{up_to}, {FASTEST:g} times the bound: what is faster is hardly felt."
+    up_to = f" up to {apa.number(fastest_Hz)} Hz" if beyond else ""
+    level = apa.percent(found.critical.level, 0)
+    faster = f" Shown is what shoots at{up_to}: what is faster on the front is predicted below {level}."
     return Section(
         title="The trade: felt against fast",
         paragraphs=(
