@@ -17,6 +17,7 @@ from analysis.logs.exclusions import left_out_by_files
 from analysis.logs.reading import read_logs
 from analysis.summary.deviations import AnalysisFiles, deviations
 from analysis.summary.participation import participation
+from analysis.summary.summary import summarize
 from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -169,8 +170,12 @@ def test_designs_of_two_names_that_are_alike_otherwise_stay_apart(study: Path) -
     path = study / "magnitude.toml"
     path.write_text(path.read_text().replace('design = "magnitude"', 'design = "again"'))
     do(study, "P01", "P02")
-    found = {one.design.design: one.table["participant_id"].nunique() for one in read_logs([study / "results"]).designs}
+    logs = read_logs([study / "results"])
+    found = {one.design.design: one.table["participant_id"].nunique() for one in logs.designs}
     assert found == {"magnitude": 1, "again": 2}
+    (title,) = {one.design.title for one in logs.designs}
+    told = {name: one.title for name, one in summarize(logs).designs.items()}
+    assert told == {"magnitude": f"{title} (magnitude)", "again": f"{title} (again)"}
 
 
 def test_a_synthetic_run_that_gave_way_is_none_of_the_peoples_that_were_set_aside(study: Path, tmp_path: Path) -> None:
