@@ -49,9 +49,12 @@ def ran(folder: Path, code: str = "P01", config: str = "preference", **how: obje
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("experiment", ["direction", "realism"])
-def test_a_gun_that_was_changed_within_a_study_is_told(
-    experiment: str, quick_configs: Path, recoil: Recoil, tmp_path: Path
+@pytest.mark.parametrize(
+    ("experiment", "heading"),
+    [("direction", "Direction recognition"), ("realism", "Realism and comfort by damper and voltage")],
+)
+def test_a_gun_that_was_changed_within_a_study_is_told_on_top_and_beside_the_numbers(
+    experiment: str, heading: str, quick_configs: Path, recoil: Recoil, tmp_path: Path
 ) -> None:
     config = quick_configs / f"{experiment}.toml"
     for code in ("P01", "P02", "P03"):
@@ -67,7 +70,11 @@ def test_a_gun_that_was_changed_within_a_study_is_told(
     )
     done = recoil("analyze", "results", "--out", "out")
     assert (done.returncode, "were made with 2 setups" in done.stderr) == (1, True)
-    assert "were made with 2 setups" in (tmp_path / "out" / "report.md").read_text()
+    page = (tmp_path / "out" / "report.md").read_text()
+    said = f"4 runs of {experiment} were made with 2 setups (config and gun) and count together: P01, P02, P03 with one"
+    results, section, paper = "\n## Results\n", f"\n## {heading}\n", "\n## For your paper\n"
+    for part in (results, section, paper):
+        assert said in page.partition(part)[2].partition("\n## ")[0], part
 
 
 def test_of_very_many_setups_a_few_are_told_and_where_the_others_are() -> None:

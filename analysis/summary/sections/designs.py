@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from analysis.logs.setups import pooled_setups
 from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.labels import display_name
@@ -43,7 +44,8 @@ _TOLD = 6
 def sections_of_designs(report: ReportData) -> Iterator[Section]:
     """Each design's section, and those of its psychometric functions."""
     for name, found in report.statistics.designs.items():
-        yield _design_section(name, found)
+        section = _design_section(name, found)
+        yield replace(section, paragraphs=(*section.paragraphs, *pooled_setups(report.remarks, name)))
         yield from threshold_sections(name, found)
         yield from pair_sections(name, found)
 

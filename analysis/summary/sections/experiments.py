@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from analysis.logs.column_map import scale_of_others
+from analysis.logs.setups import pooled_setups
 from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.labels import display_name
@@ -290,7 +291,11 @@ def direction_section(report: ReportData) -> Iterator[Section]:
     note = _DIRECTION_NOTE + (_BOTH_DIRECTIONS if any(found.sensitivity.values()) else _ONE_DIRECTION)
     yield Section(
         title="Direction recognition",
-        paragraphs=(note, " ".join([_binomial_sentence(found), *([found.binomial_note] * (found.n > 1))])),
+        paragraphs=(
+            note,
+            " ".join([_binomial_sentence(found), *([found.binomial_note] * (found.n > 1))]),
+            *pooled_setups(report.remarks, "direction"),
+        ),
         pictures=(directions_picture(found),),
         tables=(
             direction_means(found),
@@ -310,7 +315,10 @@ def preference_section(report: ReportData) -> Iterator[Section]:
         return
     yield Section(
         title="Preference",
-        paragraphs=(_OWN_SCALE if report.rated_from is None else scale_of_others(report.rated_from),),
+        paragraphs=(
+            _OWN_SCALE if report.rated_from is None else scale_of_others(report.rated_from),
+            *pooled_setups(report.remarks, "preference"),
+        ),
         tables=(preference_means(found), *tukey_tables(found, "preference", planned=report.planned)),
     )
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from statistics import fmean, stdev
 
+from analysis.logs.setups import pooled_setups
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import Section
@@ -39,7 +40,8 @@ def manuscript_section(report: ReportData) -> Iterator[Section]:
 def _of_experiment(report: ReportData, name: str, found: WithinStatistics) -> Iterator[str]:
     title = EXPERIMENTS[name].capitalize()
     people = _people(report, name, found.people, found.participants.codes)
-    yield f"{title}, participants and design. {people} {_design(report, found)}"
+    design = " ".join([_design(report, found), *pooled_setups(report.remarks, name)])
+    yield f"{title}, participants and design. {people} {design}"
     if found.anova is not None:
         yield f"{title}, analysis. {_analysis(found)}"
     pairs = pairs_sentence(found, name, full=True, planned=report.planned)
@@ -166,7 +168,8 @@ def _of_design(report: ReportData, name: str, found: DesignSummary) -> Iterator[
     synthetic = "synthetic " if found.origin.synthetic else ""
     analysed = report.analysed.get(name, ())
     people = _people(report, name, how_many(found.n, f"{synthetic}participant"), analysed)
-    yield f"{found.title}, participants and design. {people} {' '.join(found.protocol)}"
+    protocol = " ".join([*found.protocol, *pooled_setups(report.remarks, name)])
+    yield f"{found.title}, participants and design. {people} {protocol}"
     lacking = (
         f"{how_many(len(question.left_out), 'participant')} gave no {question.lacked} to {asked} in some condition, "
         "and stood in no test of it."

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from analysis.logs.files import name_below, shown_name
 from analysis.logs.kinds import OF_KIND, folder_of
+from analysis.logs.setups import pooled_setups
 from analysis.report.copies import process_copies
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
@@ -47,7 +48,7 @@ def _glance(report: ReportData) -> Iterator[Section]:
     statistics, compared = report.statistics, report.comparison is not None
     paragraphs = (
         *_of_experiments(report),
-        *(text for name, one in statistics.designs.items() for text in result_sentences(name, one)),
+        *_of_designs(report),
         *(
             (f"Against the paper: {agreement(report.comparison)} They stand in the appendix.",)
             if report.comparison
@@ -64,6 +65,13 @@ def _of_experiments(report: ReportData) -> Iterator[str]:
         pairs = pairs_sentence(found, name, planned=report.planned)
         words = " ".join(filter(None, [effect_sentence(found, name), pairs]))
         yield f"{EXPERIMENTS[name].capitalize()}: {words[:1].lower()}{words[1:]}"
+        yield from pooled_setups(report.remarks, name)
+
+
+def _of_designs(report: ReportData) -> Iterator[str]:
+    for name, found in report.statistics.designs.items():
+        yield from result_sentences(name, found)
+        yield from pooled_setups(report.remarks, name)
 
 
 def _finished(report: ReportData) -> Iterator[Section]:
