@@ -20,7 +20,8 @@ from analysis.summary.designs import summarise
 from analysis.summary.figures.designs import figure_design
 from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
-from analysis.summary.sections.designs import lacking_conditions, result_sentences
+from analysis.summary.sections.content import ReportData
+from analysis.summary.sections.designs import lacking_conditions, result_sentences, sections_of_designs
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
@@ -297,6 +298,28 @@ def test_levels_of_each_group_are_described_of_everybody_and_not_tested():
     (test,) = found.tests
     assert (test.effect, found.left_out) == ("grip × voltage_V", ())
     assert "factors that are nested, not crossed, are not tested here" in test.reason
+
+
+def test_levels_of_each_group_have_no_exponent_since_nobody_has_them_all_and_no_test_is_called_planned():
+    config = design(
+        factors={
+            "method": {"levels": ["a"]},
+            "grip": {"levels": ["one", "two"], "between": True},
+            "voltage_V": {"within": "grip", "levels": {"one": [1.0, 2.0], "two": [3.0, 4.0]}},
+        },
+        questions={"q": {"kind": "number", "text": "How strong?"}},
+    )
+    rows = [
+        (f"P{person}", grip, voltage, voltage)
+        for person, (grip, voltages) in enumerate([("one", (1.0, 2.0)), ("two", (3.0, 4.0))] * 3)
+        for voltage in voltages
+    ]
+    found = summarise(config, pd.DataFrame(rows, columns=["participant_id", "grip", "voltage_V", "q"]))
+    (said,) = result_sentences("test", found)
+    why = "No power-law exponent over voltage in V: each group of people has levels of its own, so nobody has them all."
+    assert why in said
+    (section,) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
+    assert [row[-1] for table in section.tables if "tests" in table.caption for row in table.rows] == ["–", "–"]
 
 
 def test_nested_levels_have_no_exponent_and_the_report_says_why():

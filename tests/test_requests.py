@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,14 @@ from analysis.stats.contrasts import planned_contrasts
 from analysis.stats.equivalence import tost_one_sample, tost_paired
 from analysis.summary.analyze import Request, analyze
 from analysis.summary.request_data import answers_to, planned_names, request_data
-from analysis.summary.requests import BayesFactorRequest, Requested, Requests
+from analysis.summary.requests import BayesFactorRequest, Requested, Requests, check_names
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.requested import requested_sections
 from analysis.summary.summary import summarize
 from experiments.config.door import ConfigError, load
 from tests.conftest import Recoil
+from tests.designs import design
 from tests.log_files import rating_rows, ratings_path, trial_rows, trials_path, write_rows, write_study
 from tests.tables_of_designs import loaded, simulated
 
@@ -75,6 +77,41 @@ def test_what_a_request_may_name_is_known_before_there_are_data(name: str) -> No
         there.factors,
         there.grouped,
     )
+
+
+TWO_GRIPS: dict[str, object] = {"levels": ["one", "two"], "between": True}
+RATED = {"q": {"kind": "rating", "text": "How?", "minimum": 1.0, "maximum": 7.0, "grain": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        (
+            {
+                "grip": TWO_GRIPS,
+                "pulse_s": {"within": "grip", "levels": {"one": [0.004, 0.006], "two": [0.006, 0.008]}},
+            },
+            "each group of people has levels of pulse_s of its own, so nobody has all conditions",
+        ),
+        ({"grip": TWO_GRIPS}, "needs two conditions within people, and there is one"),
+        (
+            {
+                "damper": {"levels": ["off", "on"]},
+                "pulse_s": {"within": "damper", "levels": {"off": [0.004, 0.006], "on": [0.006, 0.008]}},
+            },
+            "there is no condition '0.004'; there are off/0.004, off/0.006, on/0.006, on/0.008",
+        ),
+    ],
+)
+def test_a_test_of_conditions_that_nobody_has_is_refused_before_there_are_data(
+    factors: dict[str, object], said: str
+) -> None:
+    config = design(factors={"method": {"levels": ["a"]}, **factors}, questions=RATED)
+    equal = {"kind": "equivalence", "of": "test", "question": "q", "a": "0.004", "b": "0.006", "low": -1.0, "high": 1.0}
+    weighed = {"kind": "contrasts", "of": "test", "question": "q", "weights": {"x": {"0.004": -1.0, "0.006": 1.0}}}
+    for request in Requests.model_validate_json(json.dumps({"requests": [equal, weighed]})).requests:
+        with pytest.raises(ValueError, match=re.escape(said)):
+            check_names(request, planned_names(config, "q"))
 
 
 def asked(tmp_path: Path, text: str, logs: Logs) -> tuple[Requested, ...]:

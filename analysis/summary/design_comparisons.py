@@ -31,7 +31,9 @@ def condition_tests(
     if not (names or design.between):
         return
     if question.kind == "number" and not with_levels_of_their_own(design, (*design.between, *names)):
-        yield from (_exponent(name, people, nested=_is_nested(design, people)) for name in _powers(people))
+        nested = _OTHERS_DIFFER if len(names) > 1 else _GROUPS_DIFFER
+        why = nested if _is_nested(design, people) else _TOO_FEW if len(people) < 2 else ""
+        yield from (_exponent(name, people, why) for name in _powers(people))
     if why := _untested(design, question, people):
         yield DesignTest(name="anova", effect=" × ".join((*design.between, *names)), reason=why)
     elif len(names) == 1 and (group is None or question.kind == "ranking"):
@@ -176,6 +178,7 @@ def has_exponent(levels: Collection[Level]) -> bool:
 
 
 _OTHERS_DIFFER = "factors are nested, so the means over its levels can differ by the levels of the others too"
+_GROUPS_DIFFER = "each group of people has levels of its own, so nobody has them all"
 
 
 def _powers(people: pd.DataFrame) -> list[str]:
@@ -184,9 +187,12 @@ def _powers(people: pd.DataFrame) -> list[str]:
     return [name for name in names if has_exponent(people.columns.unique(name).to_list())]
 
 
-def _exponent(name: str, people: pd.DataFrame, *, nested: bool) -> DesignTest:
-    """The mean exponent of the power law: each person's slope of log number over log level, tested against 0."""
-    if why := _OTHERS_DIFFER if nested else _TOO_FEW if len(people) < 2 else "":
+def _exponent(name: str, people: pd.DataFrame, why: str) -> DesignTest:
+    """The mean exponent of the power law: each person's slope of log number over log level, tested against 0.
+
+    `why` there is none, if so.
+    """
+    if why:
         return DesignTest(name="exponent", effect=name, reason=why)
     means = people.T.groupby(level=name).mean()
     slopes = np.polyfit(np.log(means.index.to_numpy(dtype=np.float64)), means.to_numpy(dtype=np.float64), 1)[0]

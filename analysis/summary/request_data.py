@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -16,6 +16,7 @@ from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
+from analysis.summary.design_comparisons import nested_between
 from analysis.summary.designs import question_scores, varied
 from analysis.summary.requests import (
     LOGARITHMS,
@@ -72,9 +73,27 @@ def planned_names(design: DesignConfig, asked: str | None) -> RequestNames:
         methods = design.factors[METHOD_FACTOR].all_levels
         return RequestNames(conditions=tuple(map(str, methods)), factors={METHOD_FACTOR: methods})
     _question(design, asked)
-    within = [design.factors[name].all_levels for name in varied(design) if name not in design.between]
-    conditions = tuple(_conditions(product(*within))) if within else ("score",)
-    return RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between))
+    within = [name for name in varied(design) if name not in design.between]
+    conditions = tuple(_conditions(_met(design, within))) if within else ("score",)
+    return _names(design, conditions)
+
+
+def _met(design: DesignConfig, within: Sequence[str]) -> Iterator[tuple[Level, ...]]:
+    """The levels of these factors that meet: of a nested one those alone that its outer factor's level has."""
+    outer = {name: design.factors[name].within for name in within}
+    for levels in product(*(design.factors[name].all_levels for name in within)):
+        at: dict[str | None, Level] = dict(zip(within, levels, strict=True))
+        if all(at[one] in design.factors[one].levels_within(at[of]) for one, of in outer.items() if of in at):
+            yield levels
+
+
+def _names(design: DesignConfig, conditions: tuple[str, ...]) -> RequestNames:
+    return RequestNames(
+        conditions=conditions,
+        factors=_factors(design),
+        grouped=bool(design.between),
+        parted=tuple(nested_between(design)),
+    )
 
 
 def unit_of_bounds(design: DesignConfig, asked: str | None) -> str:
@@ -138,7 +157,7 @@ def _of_design(design: DesignConfig, asked: str | None, table: pd.DataFrame) -> 
         trials=found.real,
         unit=_unit(design.questions[name]),
         shares=design.questions[name].kind in _SHARES,
-        names=RequestNames(conditions=conditions, factors=_factors(design), grouped=bool(design.between)),
+        names=_names(design, conditions),
     )
 
 

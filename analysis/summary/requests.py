@@ -114,12 +114,13 @@ class Requested:
 class RequestNames:
     """What a request may name: conditions, and factors with their levels in the order of the design.
 
-    `grouped`: some factor varies between people.
+    `grouped`: some factor varies between people. `parted`: factors of which each such group has levels of its own.
     """
 
     conditions: tuple[str, ...]
     factors: Mapping[str, tuple[Level, ...]]
     grouped: bool = False
+    parted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -182,6 +183,11 @@ def check_names(request: AnyRequest, names: RequestNames) -> None:
 
 
 def _check_conditions(asked: Iterable[str], names: RequestNames) -> None:
+    if names.parted:
+        parted = f"each group of people has levels of {' and '.join(names.parted)} of its own"
+        raise ValueError(f"{parted}, so nobody has all conditions, which such a test needs; take mixed-model")
+    if len(names.conditions) < 2:
+        raise ValueError("such a test needs two conditions within people, and there is one; take mixed-model")
     for name in asked:
         if name not in names.conditions:
             raise ValueError(f"there is no condition {name!r}; there are {', '.join(names.conditions)}")

@@ -333,7 +333,8 @@ def _tables(found: DesignSummary, name: str, question: QuestionSummary) -> Itera
         yield _conditions(found, named_scale, replace(question, preferred=None))
     if question.tests:
         header = ("Test", "Of", "Statistic", "df", "p", "Effect or interval", "Standing")
-        rows = tuple((*_test(found, question, test), _standing(question, test)) for test in question.tests)
+        standings = (apa.NO_NUMBER if _is_none(test) else _standing(question, test) for test in question.tests)
+        rows = tuple((*_test(found, question, test), how) for test, how in zip(question.tests, standings, strict=True))
         note = f"; {_PLANNED}" if any(row[-1] == "planned" for row in rows) else ""
         note += f"; {_POOLED}" if any(test.name == "d_prime" for test in question.tests) else ""
         note += _false_alarms_of(found, question) if question.detected and _POOLED in note else ""
