@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -150,6 +151,22 @@ def test_who_is_left_out_stands_among_the_deviations_though_a_synthetic_run_was_
     unused = [one for one in found.deviations if one.kind == "exclusion" and "not used" in one.what]
     assert [one.who for one in unused] == [("P01",)]
     assert "levels = [0.004, 0.018], not [0.006, 0.018]" in unused[0].what
+
+
+def test_a_value_with_a_semicolon_stands_whole_among_the_deviations(study: Path) -> None:
+    path, asked = study / "magnitude.toml", 'text = "How strong; as a number?"'
+    path.write_text(re.sub(r"(?<=\[questions.strength\]\n)(.*\n)text = .*", rf"\1{asked}", path.read_text()))
+    assert asked in path.read_text()
+    freeze(study, "", RealClock())
+    do(study, "P01")
+    path.write_text(path.read_text().replace("; as", ": as"))
+    freeze(study, "plainer", RealClock())
+    do(study, "P02")
+    ((found,), _) = deviations(read_logs([study / "results"]), AnalysisFiles())
+    (unused,) = (one.what for one in found.deviations if one.kind == "exclusion")
+    assert unused.endswith(
+        f'questions.strength.text = "How strong; as a number?", not "How strong: as a number?" (rule: {ONE_DESIGN})'
+    )
 
 
 def test_an_archive_calls_the_run_one_of_another_design_and_not_a_broken_one(study: Path, tmp_path: Path) -> None:

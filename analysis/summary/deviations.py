@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import JsonValue
 
+from analysis.logs.design_logs import APART
 from analysis.logs.journals import RunFile, journal_of
 from analysis.logs.reading import Logs
 from analysis.summary.found_studies import FoundStudy, real_place
@@ -291,7 +292,7 @@ def _exclusions(looked: FoundStudy) -> Iterator[Deviation]:
         person, place = (problem.participant, problem.experiment), real_place(journal_of(str(problem.file)))
         mine = problem.study == str(looked.results) and all(person) and place not in looked.strangers
         if mine and problem.participant not in looked.excluded:
-            why = problem.message.partition(";")[0].replace(f"{problem.file.parent}{os.sep}", "")
+            why = problem.message.removesuffix(f"; {APART}").replace(f"{problem.file.parent}{os.sep}", "")
             yield Deviation(kind="exclusion", what=f"log of {problem.experiment} not used: {why}", who=person[:1])
 
 
