@@ -270,6 +270,22 @@ def test_a_log_with_the_name_of_a_copy_is_named_and_not_read(name: str, tmp_path
     assert len(found.logs) == len(before.logs) - 1
 
 
+def test_a_participants_folder_without_a_log_and_a_file_in_its_place_are_named(tmp_path: Path) -> None:
+    write_study(tmp_path / "a", participants=1)
+    for name in ("sub-P02", "sub-P03", "sub-P04", "sub-P05/beh", "photos"):
+        (tmp_path / "a" / name).mkdir(parents=True)
+    (tmp_path / "a" / "sub-P03" / "sub-P03_task-direction_trials.csv.gz").write_text("x")
+    (tmp_path / "a" / "sub-P04" / "sub-P04_task-direction_practice_trials.csv").write_text("x")
+    write_rows(tmp_path / "a" / "sub-P05" / "beh" / "sub-P05_task-direction_trials.csv", trial_rows("P05"))
+    for name in ("sub-P06", "sub-P07.zip", "sub-P08_task-direction_shots.csv"):
+        (tmp_path / "a" / name).write_text("x")
+    found = {one.file.name: one.message for one in find_logs([tmp_path]).problems}
+    assert sorted(found) == ["sub-P02", "sub-P03", "sub-P06", "sub-P07.zip"]
+    assert "without a log or a journal; in it: nothing; put back what is missing" in found["sub-P02"]
+    assert "in it: sub-P03_task-direction_trials.csv.gz;" in found["sub-P03"]
+    assert all("a file where a participant's folder belongs" in found[name] for name in ("sub-P06", "sub-P07.zip"))
+
+
 def test_what_was_set_aside_or_practised_is_no_copy(tmp_path: Path) -> None:
     write_study(tmp_path / "a", participants=1)
     for name in ("_trials.aside-1.csv", "_practice_trials (1).csv", "_shots.csv"):

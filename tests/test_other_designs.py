@@ -195,6 +195,16 @@ def test_designs_of_two_names_that_are_alike_otherwise_stay_apart(study: Path) -
     assert told == {"magnitude": f"{title} (magnitude)", "again": f"{title} (again)"}
 
 
+def test_a_log_that_is_named_for_another_experiment_is_named(study: Path) -> None:
+    do(study, "P01")
+    for path in [*(study / "results" / "sub-P01").iterdir()]:
+        path.rename(path.with_name(path.name.replace("magnitude", "loudness")))
+    logs = read_logs([study / "results"])
+    assert [one.design.design for one in logs.designs] == ["magnitude"]
+    said = "analysed as 'magnitude', of which its journal is, though it is named for 'loudness'"
+    assert said in [one.message for one in logs.remarks]
+
+
 def test_a_synthetic_run_that_gave_way_is_none_of_the_peoples_that_were_set_aside(study: Path, tmp_path: Path) -> None:
     do(study, "P01", person=False)
     set_aside(study, "P01")

@@ -155,6 +155,12 @@ class LogsSoFar:
             if beside.said:
                 self.remarks.append(BadLogError(beside.said).of(one.file, log.code, log.experiment, one.study))
 
+    def note_name(self, one: WaitingFile, log: Log) -> None:
+        """A file that is named for another experiment than it is of."""
+        if (named := experiment_in_name(one.path)) != log.experiment:
+            said = f"analysed as {log.experiment!r}, of which its journal is, though it is named for {named!r}"
+            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
+
     def changed_setups(self) -> list[Problem]:
         """Which logs that count together were made with several setups, and what differs."""
         return changed_setups(

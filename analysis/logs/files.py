@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from device.messages import RecoilError, escaped
+from device.messages import RecoilError, escaped, first_few
 from experiments.record import storage, tables
 
 ARCHIVE_FILE = "archive.json"
@@ -46,6 +46,9 @@ _RENAMED = (
     "not read for its name, which is that of a copy (rule: sub-CODE_task-EXPERIMENT_trials.csv or _ratings.csv, and "
     "_journal.jsonl beside it); if it is somebody's only log, give it that name, else delete it"
 )
+_LIKE_A_FOLDER = re.compile(r"sub-[^_.]+(\.(zip|gz|tgz|tar|rar|7z))?", re.IGNORECASE)
+_LACKING = "put back what is missing, unpacked if it was packed, or delete this"
+_FEW = 3
 _LINKED = "a link to a folder, and linked folders are not read, so nobody is read twice; put the folder itself here"
 
 
@@ -66,7 +69,7 @@ class Problem:
     study: str = ""
 
     def __str__(self) -> str:
-        named = not self.participant or code_in_name(str(self.file)) == self.participant
+        named = not self.participant or code_in_name(f"{self.file}_") == self.participant
         who = "" if named else f"participant {self.participant} of "
         line = "" if self.line is None else f", line {self.line}"
         column = "" if self.column is None else f", column {self.column}"
@@ -201,12 +204,14 @@ def _study(real: str, top: str) -> str:
 def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) -> dict[str, str]:
     """The files below a folder by their real paths, in the order of their paths.
 
-    Linked folders are not entered; a participant's is named.
+    Linked folders are not entered; a participant's is named, and so is one without a log.
     """
     logs: list[tuple[str, str]] = []
+    folders: list[str] = []
     waiting = [(str(folder), os.path.realpath(folder))]
     while waiting:
         place, real = waiting.pop()
+        folders.append(place)
         try:
             with os.scandir(place) as entries:
                 for entry in entries:
@@ -220,10 +225,26 @@ def _in_folder(folder: Path, endings: tuple[str, ...], problems: list[Problem]) 
         except OSError as error:
             reason = f"cannot be read: {error.strerror or error}"
             problems.append(Problem(file=Path(place), line=None, column=None, message=reason))
+    problems += _without_a_log(folders[1:], [*(path for path, _ in logs), *(f"{one.file}{os.sep}" for one in problems)])
     found: dict[str, str] = {}
     for path, real in sorted(logs, key=lambda log: _by_parts(log[0])):
         found.setdefault(real, path)
     return found
+
+
+def _without_a_log(folders: Iterable[str], files: Iterable[str]) -> Iterator[Problem]:
+    """What is said of the participants' folders that hold none of the files, and no folder, as those of BIDS do."""
+    held = set[str]()
+    for file in files:
+        folder = file.rpartition(os.sep)[0]
+        while folder and folder not in held:
+            held.add(folder)
+            folder = folder.rpartition(os.sep)[0]
+    for folder in (one for one in folders if one not in held and _name(one).startswith("sub-")):
+        children = sorted(Path(folder).iterdir())
+        if not any(path.is_dir() for path in children):
+            there = first_few([path.name for path in children], _FEW) or "nothing"
+            yield _not_read(folder, f"a participant's folder without a log or a journal; in it: {there}; {_LACKING}")
 
 
 def _by_parts(path: str) -> str:
@@ -237,6 +258,8 @@ def _why_not_read(entry: os.DirEntry[str], endings: tuple[str, ...]) -> str:
         return "" if entry.is_file() else _NO_FILE if entry.is_symlink() else storage.NO_FILE
     if _LIKE_A_LOG.fullmatch(entry.name) and _is_counted(entry.name):
         return _RENAMED
+    if _LIKE_A_FOLDER.fullmatch(entry.name) and entry.is_file():
+        return f"a file where a participant's folder belongs; {_LACKING}"
     return _LINKED if entry.name.startswith("sub-") and entry.is_dir() else ""
 
 
@@ -244,7 +267,8 @@ def _not_read(path: str, why: str) -> Problem:
     folder, _, name = path.rpartition(os.sep)
     real = os.path.realpath(folder)
     study = _study(f"{real}{os.sep}{name}", real)
-    return BadLogError(why).of(Path(path), code_in_name(f"{path}_") or "", experiment_in_name(path), study)
+    code = code_in_name(f"{Path(path).stem}_") or ""
+    return BadLogError(why).of(Path(path), code, experiment_in_name(path), study)
 
 
 def code_in_name(path: str) -> str | None:

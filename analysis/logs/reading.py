@@ -240,6 +240,7 @@ def _designed(
             reading.admit(number * LOGS_A_FILE, waiting, of_design, study)
             reading.note(number * LOGS_A_FILE, waiting, of_design, log.journal)
             reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
+            reading.note_name(waiting, of_design)
             logs[number * LOGS_A_FILE] = log
             if told := told_by_design(number * LOGS_A_FILE, log.design, log.rows):
                 reading.told.setdefault(log.design.design, []).append(told)
