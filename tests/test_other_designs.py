@@ -175,8 +175,8 @@ def test_an_archive_calls_the_run_one_of_another_design_and_not_a_broken_one(stu
     do(study, "P03", person=False)
     export_archive(ArchiveRequest(folder=study, out=tmp_path / "archive", include_synthetic=True))
     rows = csv.DictReader((tmp_path / "archive" / "contents.csv").read_text().splitlines())
-    assert {row["participant_id"]: row["state"] for row in rows} == {
-        "P01": "finished", "P02": "finished", "P03": "other design"
+    assert {row["participant_id"]: (row["state"], row["data"]) for row in rows} == {
+        "P01": ("finished", "synthetic"), "P02": ("finished", "synthetic"), "P03": ("other design", "synthetic")
     }  # fmt: skip
     (one,) = left_out_in(tmp_path / "archive")
     assert (one.participant, one.rule, one.file) == ("P03", ONE_DESIGN, "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -11,12 +12,13 @@ from typing import Literal, get_args
 from analysis.logs.design_logs import ONE_DESIGN
 from analysis.logs.exclusions import FINISHED, TRUSTED, LeftOut
 from analysis.logs.files import Problem, code_in_name, experiment_in_name
-from analysis.logs.journals import RunFile
+from analysis.logs.journals import RunFile, journal_of
 from analysis.logs.kinds import IN_REGISTER, kept_out
 from analysis.logs.reading import Logs
-from experiments.record import storage, tables
+from experiments.record import journal, storage, tables
+from experiments.record.journal import JournalError
 from experiments.record.tables import Column, DataKind
-from experiments.study.folders import PlaceError
+from experiments.study.folders import PlaceError, data_of
 from experiments.study.study import Member
 
 CONTENTS = "contents.csv"
@@ -96,7 +98,7 @@ def left_out_entries(
         code = problem.participant or code_in_name(str(problem.file)) or ""
         experiment = problem.experiment or experiment_in_name(str(problem.file))
         state = "excluded" if code in excluded else state
-        yield Entry(participant_id=code, experiment=experiment, state=state, kind=_KEPT_OUT.get(problem.message))
+        yield Entry(participant_id=code, experiment=experiment, state=state, kind=_data(problem))
     files = {code_in_name(str(file)) for part in (logs, *logs.apart) for file in part.files}
     seen = {run.participant for run in runs} | files | {problem.participant for problem in logs.problems}
     for code in members:
@@ -150,6 +152,14 @@ def _why(problem: Problem) -> EntryState:
     if f"(rule: {ONE_DESIGN})" in problem.message:
         return "other design"
     return "kept out" if problem.message in _KEPT_OUT else "broken"
+
+
+def _data(problem: Problem) -> DataKind | None:
+    """Whose data a log holds that is left out: another kind than the archive's, or as its journal says, if it does."""
+    head = None
+    with suppress(JournalError):
+        head = journal.head(Path(journal_of(str(problem.file))))
+    return _KEPT_OUT.get(problem.message) or (None if head is None else data_of(head))
 
 
 _KEPT_OUT: Mapping[str, DataKind] = {
