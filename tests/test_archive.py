@@ -424,6 +424,20 @@ def test_a_table_that_no_journal_makes_is_named(copy: Path) -> None:
     assert verify(copy).faults == ("analysis/other.csv: no journal of the archive makes it",)
 
 
+def test_the_verdict_names_the_files_and_which_recoil_made_them(copy: Path) -> None:
+    statistics = json.loads((copy / "analysis" / "statistics.json").read_bytes())
+    for method in ("asymmetric-1", "asymmetric-2"):
+        mean = statistics["preference"]["means"][method]
+        _edited(copy, "analysis/statistics.json", f"{mean!r}", f"{mean + 1}")
+    found = verify(copy)
+    assert len(found.faults) == 2
+    but = "but 1 file is not what this Recoil makes of its journals: analysis/statistics.json"
+    assert f"every file has the hash of the manifest, {but}; if another state of Recoil" in found.as_text()
+    ours = statistics["versions"]["recoil"]
+    _edited(copy, "analysis/statistics.json", f'"recoil": "{ours}"', '"recoil": "0.0.1"')
+    assert f"Recoil 0.0.1 made the archive, and this is {ours}: verify it with that one" in verify(copy).as_text()
+
+
 @pytest.mark.parametrize(("by", "whole"), [(1e-13, True), (1e-6, False)])
 def test_other_versions_may_differ_by_a_millionth_of_a_millionth(copy: Path, by: float, whole: bool) -> None:
     place = copy / "analysis" / "statistics.json"

@@ -24,15 +24,18 @@ from analysis.report import placing
 from analysis.report.serial import as_json
 from analysis.summary.analyze import result_files
 from analysis.summary.results import STATISTICS_FILE
-from device.messages import RecoilError, escaped
+from device.messages import RecoilError, escaped, first_few
 from experiments.rebuild import rebuild, shots_path, shots_table
 from experiments.record import journal, storage
 from experiments.record.lines import strict_json
+from experiments.record.provenance import recoil_version
 from experiments.study.folders import PlaceError
 from experiments.study.register import REGISTER_FILE
 
 CLOSE = 1e-12
 """How far numbers may be from each other, in parts of the larger one or by themselves."""
+_FILES = 3
+"""So many files are named in the verdict."""
 _NAMED = 20
 """So many numbers of a file are named."""
 
@@ -42,7 +45,8 @@ class Verified:
     """What was checked of an archive, what is wrong with it, and what there is to say otherwise, a line each.
 
     `manifest_sha256` vouches for all of it: whoever published it knows which archive this is. `rebuilt` are the tables
-    and statistics that were made again and found to be the same; none if a hash is wrong already.
+    and statistics that were made again; none if a hash is wrong already. `recoil`: what its statistics name as the
+    version that made them, if they do.
     """
 
     archive: str
@@ -51,6 +55,7 @@ class Verified:
     rebuilt: int
     faults: tuple[str, ...]
     remarks: tuple[str, ...] = ()
+    recoil: str | None = None
 
     @property
     def whole(self) -> bool:
@@ -64,7 +69,17 @@ class Verified:
             made = f"{self.rebuilt} tables and statistics made again from its journals are the same"
             vouches = f"sha256 of its manifest: {self.manifest_sha256}"
             return f"{shown}: whole ({self.files} files), and {made}\n{vouches}"
-        return f"{shown}: {len(self.faults)} of its parts are not as they were archived"
+        if not self.rebuilt:
+            return f"{shown}: {len(self.faults)} of its parts are not as they were archived"
+        files = [*dict.fromkeys(fault.partition(": ")[0] for fault in self.faults)]
+        one = "1 file is" if len(files) == 1 else f"{len(files)} files are"
+        otherwise = f"{one} not what this Recoil makes of its journals: {first_few(files, _FILES)}"
+        return f"{shown}: every file has the hash of the manifest, but {otherwise}; {self._made_by()}"
+
+    def _made_by(self) -> str:
+        if self.recoil in (None, recoil_version()):
+            return "if another state of Recoil made the archive, verify it with that one"
+        return f"Recoil {self.recoil} made the archive, and this is {recoil_version()}: verify it with that one"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,14 +97,14 @@ def verify(folder: Path, track: Track = iter) -> Verified:
         raise PlaceError(f"{folder}: no such folder; name an archive that `recoil export archive` wrote")
     hashes = manifest.read_manifest(folder)
     faults = [*hashes.faults, *manifest.faults(folder, hashes)]
-    remarks, rebuilt = list[str](), 0
+    remarks, rebuilt, recoil = list[str](), 0, None
     if not faults:
         with tempfile.TemporaryDirectory(prefix="recoil-verify-") as place:
             try:
                 made = [*_made_again(folder, Path(place), hashes.listed, track)]
                 faults, remarks = _compared(folder, hashes.listed, made)
                 faults += [*_contents_faults(folder), *making.preregistration_faults(folder)]
-                rebuilt = len(made)
+                rebuilt, recoil = len(made), _recoil_of(_versions(folder))
             except RecoilError as error:
                 said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")
                 faults = [f"cannot be made again: {line}" for line in said.split("\n")]
@@ -100,6 +115,7 @@ def verify(folder: Path, track: Track = iter) -> Verified:
         rebuilt=rebuilt,
         faults=tuple(map(escaped, faults)),
         remarks=tuple(map(escaped, remarks)),
+        recoil=recoil,
     )
 
 
@@ -145,6 +161,11 @@ def _versions(folder: Path) -> object:
     """The versions that an archive's statistics were made with."""
     values = _json(folder / ANALYSIS / STATISTICS_FILE)
     return values.get("versions") if isinstance(values, dict) else None
+
+
+def _recoil_of(versions: object) -> str | None:
+    named = versions.get("recoil") if isinstance(versions, dict) else None
+    return None if named is None else escaped(str(named))
 
 
 def _json(path: Path) -> object:
