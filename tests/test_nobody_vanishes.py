@@ -133,6 +133,22 @@ def test_unanswered_trials_are_told_with_everybody_and_the_remedy(recoil: Recoil
 
 
 @pytest.mark.slow
+def test_who_is_excluded_by_hand_and_has_no_run_is_not_waited_for(tmp_path: Path) -> None:
+    results = write_study(tmp_path, participants=2)
+    for code in ("P03", "P04"):
+        register.append(results, register.entry("joined", code, facts={}), VirtualClock())
+    register.append(results, register.entry("excluded", "P03", reason="came by mistake"), VirtualClock())
+    logs = read_logs([results])
+    found = with_everybody(summarize(logs), logs).participation
+    assert found is not None
+    assert [one.not_done for one in found.experiments.values()] == [1, 1]
+    assert {one.participant: one.state for one in found.absent} == {
+        "P03": "excluded by hand, and not done",
+        "P04": "not done",
+    }
+
+
+@pytest.mark.slow
 def test_everybody_is_counted_in_every_experiment(tmp_path: Path) -> None:
     results = write_study(tmp_path, participants=2)
     trials_path(results, "P02").write_bytes(b"participant_id\r\n")

@@ -17,8 +17,9 @@ from experiments.study.study import by_code
 class PeopleOfExperiment:
     """How many people are in the analysis of an experiment, and how many are not, by the reason.
 
-    `begun`: not finished; `not_done`: known from elsewhere in a study that has the experiment. `practices` and
-    `set_aside` count runs, which are not data; those of another kind, as of synthetic participants, are not counted.
+    `begun`: not finished; `not_done`: known from elsewhere in a study that has the experiment, and not excluded by
+    hand. `practices` and `set_aside` count runs, which are not data; those of another kind, as of synthetic
+    participants, are not counted.
     """
 
     analysed: int
@@ -72,7 +73,10 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
         if (who, experiment) in why:
             one = why[who, experiment]
             return f"{'begun' if one.rule == FINISHED else 'left out'}: {one.reason}{gone}"
-        return f"not done{gone.replace(';', ':')}" if (_study_of(who), experiment) in there else ""
+        if (_study_of(who), experiment) not in there:
+            return ""
+        out = who in joined and joined[who].excluded is not None
+        return _EXCLUDED if out else f"not done{gone.replace(';', ':')}"
 
     order = sorted(people, key=by_code)
     absent = tuple(
@@ -87,6 +91,10 @@ def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: S
         experiments={name: _counted(name, len(within.get(name, ())), counts, kinds) for name in names},
         absent=absent,
     )
+
+
+_EXCLUDED = "excluded by hand, and not done"
+"""Of whom nothing is waited for."""
 
 
 def _counted(
