@@ -30,7 +30,7 @@ from experiments.record.journal import read_journal
 from experiments.run import run
 from experiments.run_request import Again, RunRequest
 from experiments.screens.synthetic import synthetic_screen
-from experiments.study.changes import KeyChange, setup_changes, setup_key
+from experiments.study.changes import KeyChange, changed_keys, setup_changes, setup_key
 from experiments.study.files_begun_with import copy_began_with
 from experiments.study.folders import freeze_status
 from experiments.study.new_study import new_study
@@ -91,10 +91,9 @@ def at(record: Any, place: Place) -> Any:
 
 
 def recorded_keys(config: BaseModel, record: Record) -> list[Key]:
-    """Every key that need not be there, without what is in no record, as a gun's `serial`."""
-    return [
-        key for key in optional_keys(config) if key.place[0] in record and key.place[-1] in at(record, key.place[:-1])
-    ]
+    """Every key that is compared and need not be there, without what is in no record, as a gun's `serial`."""
+    keys = (key for key in optional_keys(config) if key.place != ("synthetic",))
+    return [key for key in keys if key.place[0] in record and key.place[-1] in at(record, key.place[:-1])]
 
 
 def plain(record: object) -> Record:
@@ -180,6 +179,18 @@ def test_a_key_that_was_recorded_otherwise_or_is_unknown_now_is_named_with_both_
         at(then[part], table)["unheard_of"] = 3
         unknown = Key(key.of, (*table, "unheard_of"), is_default=False)
         assert [(one.key, one.frozen, one.now) for one in setup_changes(then, now)] == [(unknown.dotted, 3, None)]
+
+
+def test_the_file_of_synthetic_answers_is_no_part_of_what_people_do() -> None:
+    setup = load_setup("preference")
+    before, after = (
+        setup.config.model_copy(update={"synthetic": name}).model_dump(mode="json") for name in (None, "x")
+    )
+    assert before != after
+    then, now = ({**plain(setup.record()), "experiment": one} for one in (before, after))
+    assert setup_changes(then, now) == setup_changes(now, then) == []
+    assert setup_key(then) == setup_key(now)
+    assert [*changed_keys("preference.toml", before, after, DesignConfig)] == []
 
 
 # a study and its runs

@@ -58,6 +58,7 @@ def changed_keys(
 
     `model`: what it is read as, if its defaults are recorded.
     """
+    frozen, now = (_of_people(model, values) for values in (frozen, now))
     before, after = (dict(_leaves(without_reasons(values))) for values in (frozen, now))
     if model is not None and before.keys() != after.keys():
         before, after = _with_defaults(model, frozen), _with_defaults(model, now)
@@ -68,6 +69,11 @@ def changed_keys(
     for table in was.keys() & is_now.keys():
         if was[table] != is_now[table] and sorted(was[table]) == sorted(is_now[table]):
             yield KeyChange(file=file, key=table, frozen=[*was[table]], now=[*is_now[table]])
+
+
+def _of_people(model: type[Model] | None, values: FileValues) -> FileValues:
+    """A design without the file of its synthetic participants, whose answers are no part of what people do."""
+    return {key: value for key, value in values.items() if model is not DesignConfig or key != "synthetic"}
 
 
 def _with_defaults(model: type[Model], recorded: FileValues) -> dict[str, JsonValue]:
@@ -107,7 +113,7 @@ def changes_told(changes: Sequence[KeyChange]) -> str:
 
 def setup_key(setup: object) -> str:
     """What setups share between which nothing differs, by whichever version they were recorded."""
-    tables = [(model, table_in(setup, part)) for part, model in _OF_SETUP.items()]
+    tables = [(model, _of_people(model, table_in(setup, part))) for part, model in _OF_SETUP.items()]
     parts = [_with_defaults(model, table) for model, table in tables]
     known = [{key: value for key, value in part.items() if value is not None} for part in parts]
     return sha256([known, [orders_of(table) for _, table in tables]])
