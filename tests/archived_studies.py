@@ -78,7 +78,7 @@ def _write_remarks(path: Path) -> None:
     ]
     entries += [{"kind": "remark", "body": body, **times} for body in said]
     entries.append({"kind": "stopped", "reason": f"{NAME} left", **times})
-    entries[0]["setup"]["experiment"]["synthetic"] = f"{SECRET_PLACES[1]}/synthetic.toml"
+    entries[0]["setup"]["experiment"] |= {"synthetic": f"{SECRET_PLACES[1]}/synthetic.toml", "assumed": []}
     entries[0]["host"] = f"lab-pc of {NAME}"
     path.write_bytes(_with_hashes(entries))
     table, data, _ = rebuild(path)

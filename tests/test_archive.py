@@ -139,7 +139,7 @@ def test_the_methods_section_says_who_was_simulated_and_what_other_setups_have_o
     sections = [part for part in re.split(r"(?m)^# ", page) if part]
     assert len(set(sections)) == len(sections)
     (other,) = (part for part in sections if "What differs" in part)
-    assert "differs from the first setup of this experiment: experiment synthetic = " in other
+    assert "differs from the first setup of this experiment: experiment assumed = " in other
     assert not any(place in page for place in SECRET_PLACES)
 
 
