@@ -36,7 +36,7 @@ MEANINGS: Mapping[EntryState, str] = {
     "kept out": "left out: data of another kind (real, simulated gun, synthetic) than the archive's",
     "no journal": "left out: a table that no journal proves",
     "other design": "left out: a sound run of another design than the one that is frozen, or that most runs have",
-    "broken": "left out: table or journal breaks a rule, or was changed since the run",
+    "broken": "left out: table or journal is missing, breaks a rule, or was changed since the run",
     "no run": "the participant joined and has no run",
 }
 
