@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import NoReturn, Protocol
 
 from device import DeviceError, Gun, GunStatus
 from device.messages import RecoilError
-from experiments.clock import STANDSTILL_S, Clock
+from experiments.clock import Beats, Clock
 from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalError, JournalGone
 from experiments.session import events, judging
@@ -90,34 +90,6 @@ class Screen(Protocol):
 
     def gun_seen(self, status: GunStatus | None, fault: str) -> None:
         """Show what the gun itself says of its state, or why it says nothing."""
-
-
-_SETTLED = 3
-"""So many beats in time after that, and what was pressed meanwhile has come."""
-
-
-class Beats:
-    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same program.
-
-    What was pressed in a standstill is dated in it, or as it comes. Where nothing beats, nothing stands still.
-    """
-
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
-
-    def beat(self) -> None:
-        """The timer beats. The time is read once: wherever this itself stands still, the next beat is late."""
-        now_s = self._now()
-        self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
-        self._last_s = now_s
-        if self._in_time == _SETTLED:
-            self._alive_s = now_s
-
-    @property
-    def alive_since_s(self) -> float:
-        """Since when; infinity while it stands still, and until what was pressed meanwhile has come."""
-        is_late = self._now() - self._last_s > STANDSTILL_S
-        return math.inf if is_late or self._in_time < _SETTLED else self._alive_s
 
 
 class LiveRun:
@@ -316,13 +288,17 @@ class LiveRun:
             if self._position.state not in ARMED:
                 raise Held(self._position.why)
 
-    def allow_first_shot(self) -> None:
-        """As `allow_shot`; it pauses if the program stood still since the press: nobody expects that shot any more."""
+    def may_fire(self) -> bool:
+        """As `allow_shot`; false, for a moment, while what was pressed in a standstill is still to come.
+
+        It pauses if the program stood still for long since the key to fire: nobody expects a shot any more.
+        """
         if self.beats.alive_since_s > self._to_fire_s and self.offer(events.Pause()):
             self._screen.trouble(judging.STOOD_STILL)
             self.remark(Noted(trial=None, text=judging.STOOD_STILL))
             raise Held("the program stood still")
         self.allow_shot()
+        return self.beats.prompt
 
     def settle(self) -> None:
         """Wait for a disarm that another thread began, so that it cannot land after the next arming."""

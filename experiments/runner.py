@@ -66,7 +66,7 @@ class Train:
         """The next shot's tick, whole microseconds after the first; later if the magnet is not home by then."""
         # left out: ticks in a standstill, or too soon after a late shot: by half, as guns always late keep their rate
         every_us, begun_s = round(self._step.repeat_every_s * 1e6), self._onset_s
-        earliest_s = max(self._live.clock.now(), self._last_s + self._step.repeat_every_s / 2)
+        earliest_s = max(self._live.clock.now() + LEAD_S, self._last_s + self._step.repeat_every_s / 2)
         tick_s = begun_s + math.ceil((earliest_s - begun_s) * 1e6 / every_us) * every_us / 1e6
         return max(tick_s, self._live.gun.status().ready_at_s)
 
@@ -375,8 +375,8 @@ class DeskGun:
             while (event := self._live.wait((at_s := train.due_s()) - LEAD_S)) is None:
                 if train.shots == step.max_shots:
                     return train.presented("limit")
-                self._live.allow_shot()
-                train.fired(self._live.gun.fire(shot, at_s))
+                if self._live.may_fire():  # else its tick is left out
+                    train.fired(self._live.gun.fire(shot, at_s))
         except Held:
             return train.interrupted()
         except DeviceError as error:
@@ -407,7 +407,8 @@ class DeskGun:
         self._live.allow_shot()
         self._live.gun.arm()
         self._live.sleep(self._live.gun.status().ready_at_s)
-        self._live.allow_first_shot()
+        while not self._live.may_fire():
+            self._live.sleep(self._live.clock.now() + LEAD_S)
 
     def _first(self, shot: Shot) -> tuple[str, ShotReport]:
         """The first shot of a stimulus, and its date and time."""

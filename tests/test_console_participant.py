@@ -18,6 +18,7 @@ from tests.at_display import AtConsole, AtDisplay, needs_display, records, remar
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
 from tests.waiting import stand_still, wait_for
 from tests.warm_start import warm
+from tests.watched_console import Watch
 
 pytestmark = [
     pytest.mark.slow,
@@ -472,3 +473,27 @@ def test_f12_on_the_participants_window_while_it_is_started_again_halts_the_run(
         screen.keys.press("q")
         assert screen.close()[0] == 130
     assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]
+
+
+@pytest.mark.parametrize("stood_s", [0.7, 2.5])
+def test_f12_on_the_participants_window_while_the_console_stands_still_in_a_train_is_heard_before_a_shot(
+    quick_configs: Path, tmp_path: Path, display: str, stood_s: float
+) -> None:
+    watch = Watch(str(tmp_path))
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display, watch) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.focus_on(PARTICIPANT)
+        fired = len(watch.calls("fired"))
+        wait_for(lambda: len(watch.calls("fired")) > fired)
+        time.sleep(0.5)  # half-way to the next shot
+        with screen.standing_still(stood_s):
+            fired = len(watch.calls("fired"))
+            screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted")
+        assert len(watch.calls("fired")) == fired
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        screen.keys.press("q")
+        screen.close()

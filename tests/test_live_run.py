@@ -194,6 +194,12 @@ def looks(sitting: Sitting, times: int) -> None:
         sitting.clock.skip(0.1)
 
 
+def looks_while_it_waits(sitting: Sitting) -> None:
+    """From now on the screen looks whenever the run waits for the gun."""
+    gets_ready = sitting.clock.by_itself
+    sitting.clock.by_itself = lambda: sitting.live.beats.beat() or gets_ready()
+
+
 @pytest.mark.parametrize("came", ["before the screen looks again", "with one of its first looks"])
 def test_a_shot_that_was_asked_for_while_the_screen_stood_still_is_not_fired(came: str, tmp_path: Path) -> None:
     with sat_at(S.PREPARING, tmp_path) as sitting:
@@ -208,6 +214,7 @@ def test_a_shot_that_was_asked_for_while_the_screen_stood_still_is_not_fired(cam
             events.Fire(), Press(at_s=sitting.clock.now() - 5.0, serial=sitting.position.serial)
         )
         assert "rendered" not in sitting.gun.words
+        looks_while_it_waits(sitting)
         assert by_hand(sitting, events.Fire())
         assert [one.event for one in remarks(of_journal(sitting), Refused)] == ["fire", "fire"]
 
@@ -228,12 +235,54 @@ def test_nor_is_one_before_which_the_program_stood_still_on_its_way(state: State
         assert sitting.gun.words.count("rendered") == fired
         assert sitting.gun.words[-1] == "disarmed"
         assert sitting.window.troubles == [STOOD_STILL]
+        looks_while_it_waits(sitting)
         for event in (events.GoOn(), DUE[state]):
             assert by_hand(sitting, event)
         assert sitting.gun.words.count("rendered") == fired + 1
         assert [one.text for one in remarks(of_journal(sitting), Noted)][-1] == STOOD_STILL
         shots = [one.cause for one in remarks(of_journal(sitting), words.TestShot)]
         assert shots == (["the program stood still", ""] if state is S.REARMING else [])
+
+
+@pytest.mark.parametrize("stood_s", [0.9, 9.0])
+def test_a_train_fires_none_late_as_the_program_wakes(stood_s: float, tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        looks(sitting, 3)
+        sitting.clock.skip(stood_s)
+        sitting.settle()
+        assert sitting.gun.words.count("rendered") == 1
+        assert (S.PAUSED in sitting.position.states) == (stood_s == 9.0)
+
+
+def test_a_train_goes_on_after_a_short_standstill_at_a_tick_of_its_own(tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        onset_s = sitting.position.onset_s
+        looks(sitting, 3)
+        sitting.clock.skip(0.9)
+        for _ in range(20):
+            looks(sitting, 1)
+            sitting.settle()
+        shots = [one.body["pulse_start_s"] for one in of_journal(sitting).records if one.kind == "shot"]
+    assert onset_s is not None
+    assert [round(one - onset_s, 6) for one in shots] == [0.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("state", [S.PREPARING, S.REARMING])
+def test_a_stop_that_waits_as_the_program_wakes_is_heard_before_a_first_shot(state: State, tmp_path: Path) -> None:
+    with sat_at(state, tmp_path) as sitting:
+        looks(sitting, 10)
+        fired = sitting.gun.words.count("rendered")
+        sitting.gun.hang = "arm"
+        assert sitting.live.offer(DUE[state])
+        assert sitting.gun.hangs.wait(PATIENCE_S)
+        sitting.clock.by_itself = lambda: False
+        sitting.clock.skip(0.7)
+        sitting.gun.release()
+        assert sitting.clock.idle.wait(PATIENCE_S)
+        assert sitting.live.offer(events.EmergencyStop(by="participant"))
+        sitting.settle()
+        assert sitting.state is S.HALTED
+        assert sitting.gun.words.count("rendered") == fired
 
 
 def test_a_standstill_as_long_as_a_gun_may_be_away_keeps_no_shot(tmp_path: Path) -> None:
