@@ -23,7 +23,7 @@ from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import Moment, refused, remark_of
-from experiments.session.remarks import OF_HALT, EntryCorrected, Halted, Noted, Remark, remark_kind, remark_record
+from experiments.session.remarks import OF_HALT, EntryCorrected, Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Answered, Asking, Interrupted, Outcome, Session, Step, step_after, step_record
 
@@ -293,10 +293,8 @@ class LiveRun:
 
         It pauses if the program stood still for long since the key to fire: nobody expects a shot any more.
         """
-        if self.beats.alive_since_s > self._to_fire_s and self.offer(events.Pause()):
-            self._screen.trouble(judging.STOOD_STILL)
-            self.remark(Noted(trial=None, text=judging.STOOD_STILL))
-            raise Held("the program stood still")
+        if self.beats.alive_since_s > self._to_fire_s:
+            self.offer(events.Pause(cause=judging.STOOD_STILL))
         self.allow_shot()
         return self.beats.prompt
 

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from experiments.session.judging import STOOD_STILL
 from experiments.session.states import State
 from tests.at_display import HAND_S, AtConsole, needs_display, remarks, virtual_display
 from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_in_one_run, check_participants_keys
 from tests.journals import raw
 from tests.pseudo_languages import RIGHT_TO_LEFT, write_pseudo_languages
+from tests.waiting import wait_for
 
 pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
@@ -167,6 +169,23 @@ def test_a_shot_that_was_asked_for_while_the_console_stood_still_is_not_fired(tm
         screen.keys.press("space")
         screen.at("asking")
     assert [one["event"] for one in remarks(cell.journal, "refused")] == ["fire"]
+
+
+def test_a_standstill_after_the_first_of_two_intervals_pauses_and_says_why_and_that_is_on_record(
+    tmp_path: Path, display: str
+) -> None:
+    cell = Cell(tmp_path, display, S.PREPARING, experiment="stronger")
+    with cell.reach() as screen:
+        screen.keys.press("space")
+        wait_for(lambda: cell.watch.calls("fired"))
+        with screen.standing_still(2.0):
+            pass
+        screen.until(lambda look: look.state == "paused" and look.says("The program stood still for more"))
+        screen.until(lambda look: look.says("The pause ended the stimulus: its trial is presented again."))
+        assert screen.look().says("The program stood still for more than 1 s, and nothing was fired after it")
+        assert len(cell.watch.calls("fired")) == 1
+    assert [one["cause"] for one in remarks(cell.journal, "paused")] == [STOOD_STILL]
+    assert remarks(cell.journal, "noted") == []
 
 
 def test_each_press_while_the_console_stood_still_is_on_record_and_a_key_that_was_held_is_one(

@@ -234,14 +234,14 @@ def test_nor_is_one_before_which_the_program_stood_still_on_its_way(state: State
         assert sitting.position.states == (state, S.PAUSED)
         assert sitting.gun.words.count("rendered") == fired
         assert sitting.gun.words[-1] == "disarmed"
-        assert sitting.window.troubles == [STOOD_STILL]
+        assert sitting.position.why == STOOD_STILL
         looks_while_it_waits(sitting)
         for event in (events.GoOn(), DUE[state]):
             assert by_hand(sitting, event)
         assert sitting.gun.words.count("rendered") == fired + 1
-        assert [one.text for one in remarks(of_journal(sitting), Noted)][-1] == STOOD_STILL
+        assert [one.cause for one in remarks(of_journal(sitting), Paused)] == [STOOD_STILL]
         shots = [one.cause for one in remarks(of_journal(sitting), words.TestShot)]
-        assert shots == (["the program stood still", ""] if state is S.REARMING else [])
+        assert shots == ([STOOD_STILL, ""] if state is S.REARMING else [])
 
 
 @pytest.mark.parametrize("stood_s", [0.9, 9.0])

@@ -148,8 +148,8 @@ class TerminalScreen:
             case State.CLOSING:
                 return f"{self._practised(over=True)}{_CLOSING}"
             case State.PAUSED:
-                why = f" {position.why}." if position.why else ""
-                return f"\n  Paused.{why} Type `go on` and Enter: "
+                why = f": {position.why}" if position.why else ""
+                return f"\n  Paused{why}. Type `go on` and Enter: "
             case State.CORRECTING if position.correcting is not None:
                 return self._correction(position.correcting)
             case State.HALTED:

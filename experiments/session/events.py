@@ -109,7 +109,9 @@ class Rearm(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pause(Event):
-    """Hold everything."""
+    """Hold everything. `cause`: why, where nobody asked for it."""
+
+    cause: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

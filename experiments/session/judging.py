@@ -16,9 +16,7 @@ from experiments.tasks.questions import on_scale
 
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
-STOOD_STILL = (
-    "Nothing was fired: the program stood still after that was pressed. Look where the gun is, go on, and press again."
-)
+STOOD_STILL = "the program stood still for more than 1 s, and nothing was fired after it: look where the gun is"
 HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
@@ -244,8 +242,8 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
             return remarks.HaltReason(text=event.text)
         case events.EmergencyStop() if before.base is not State.HALTED:
             return remarks.Halted(by=event.by)
-        case events.Pause():
-            return remarks.Paused()
+        case events.Pause(cause=cause):
+            return remarks.Paused(cause=cause)
         case events.ParticipantBack():
             return remarks.Noted(trial=None, text="The participant's screen was started again.")
         case events.ParticipantLost() if before.paused_s is None and then.paused_s is not None:

@@ -327,9 +327,9 @@ def why_after(before: Position, event: Event) -> str | None:
             return "the display was lost"
         case events.ResultsGone() if before.base is State.HALTED:
             return None
-        case events.ParticipantLost() | events.ResultsGone():
+        case events.Pause() | events.ParticipantLost() | events.ResultsGone():
             return event.cause
-        case events.Pause() | events.GoOn() | events.ParticipantBack():
+        case events.GoOn() | events.ParticipantBack():
             return ""
         case _:
             return None

@@ -229,7 +229,7 @@ def _paused(seen: Seen) -> Instruction:
             "Their screen is being started again. {go_on_key} goes on; until it is there you enter the answers.",
             go_on_key=seen.key("go on"),
         )
-    elif seen.position.why:
+    elif seen.position.why and seen.participant_gone:
         again = phrase(
             "{restart_key} starts it again. {go_on_key} goes on without it: you enter the answers.",
             restart_key=seen.key("restart"),
@@ -238,6 +238,8 @@ def _paused(seen: Seen) -> Instruction:
         detail = f"{_sentence(seen.position.why)}\n{again}"
     else:
         detail = phrase("The gun is disarmed, and nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
+        if seen.position.why:
+            detail = f"{_sentence(seen.position.why)}\n{detail}"
         if seen.participant_gone:
             gone = phrase("Their screen is gone: {restart_key} starts it again.", restart_key=seen.key("restart"))
             detail = f"{detail}\n{gone}"
