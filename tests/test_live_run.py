@@ -1471,24 +1471,18 @@ def test_a_key_that_went_into_what_is_open_on_the_console_is_nobodys_answer(tmp_
         assert len(raw_answers(of_journal(sitting))) == 1
 
 
-def test_words_for_what_is_not_done_any_more_are_kept_as_a_note(tmp_path: Path) -> None:
-    with sat_at(S.ASKING, tmp_path) as sitting:
-        sitting.press("R")
-        sitting.window.fields["line"] = "she sneezed"
-        sitting.live.offer(events.EmergencyStop(by="participant"))
-        sitting.paint()
-        assert sitting.state is S.HALTED
-        sitting.press("Enter")
-        assert sitting.window.heard[-1].endswith("What you typed is kept as a note.")
-        assert not sitting.controls.typing.line
-        assert [remark.text for remark in remarks(of_journal(sitting), Noted)] == ["repeat: she sneezed"]
-
-
-def test_an_emergency_stop_takes_a_line_away_that_was_being_typed_and_keeps_it_as_a_note(tmp_path: Path) -> None:
+@pytest.mark.parametrize("where", ["at the console", "on the participant's screen"])
+def test_an_emergency_stop_takes_a_line_away_that_was_being_typed_and_keeps_it_as_a_note(
+    where: str, tmp_path: Path
+) -> None:
     with sat_at(S.RESTING, tmp_path) as sitting:
         sitting.press("E")
         sitting.window.type_text("bored")
-        sitting.press("F12")
+        if where == "at the console":
+            sitting.press("F12")
+        else:
+            sitting.live.offer(events.EmergencyStop(by="participant"))
+            sitting.paint()
         assert not sitting.controls.typing.line
         sitting.press("Y")
         sitting.window.type_text("it smelt")

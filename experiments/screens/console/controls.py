@@ -114,6 +114,8 @@ class Controls:
             self.uncover()
         if position.number != self.drawn.number or position.base is State.HALTED:
             self._keep_typed()
+        if position.base is State.HALTED:
+            self._set_aside(OF_THE_RUN)
         self.drawn = position
 
     # keys and buttons
@@ -252,8 +254,7 @@ class Controls:
         return "" if self.drawn.state is State.PAUSED else phrase("Pause first: a new window takes the keys.")
 
     def _restart(self) -> None:
-        refused = self._no_restart()
-        if refused or self._participant is None:
+        if (refused := self._no_restart()) or self._participant is None:
             self._view.say(refused, "bad")
         else:
             self._participant.restart()
@@ -386,8 +387,7 @@ class Controls:
         """Another command takes the place of an open line, for one of some: what is typed there is kept as a note."""
         if self._open is None or self._open[0] not in names:
             return
-        text = typed_line(self._view.typed("line"))
-        if text:
+        if text := typed_line(self._view.typed("line")):
             self._live.offer(line_as_note(*self._open, text))
         self._close_line()
 
