@@ -537,16 +537,29 @@ def test_a_killed_participants_screen_can_be_started_again_in_a_train_and_done_w
 
 
 @needs_psychopy
-def test_a_participants_screen_that_does_not_start_again_ends_the_run(
+def test_a_participants_screen_that_does_not_start_again_ends_nothing(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
     journal, watch = tmp_path / f"{PREFERENCE}_journal.jsonl", Watch(str(tmp_path), participants=1)
     run = run_words(quick_configs, "preference", "--participant-screen")
     with AtConsole(run, tmp_path, display, watch) as screen:
         screen.stands(RUN)
-        screen.to("preparing", trial=1)
+        screen.to("train", trial=1)
         kill_participant(screen)
+        for tried in (1, 2):
+            screen.keys.press("s")
+            wait_for(lambda tried=tried: len(not_again(journal)) == tried)
+            screen.until(lambda look: look.says("did not start again: ") and look.says("S starts it again. P goes on "))
+            assert screen.look().state == "paused"
         screen.keys.press("s")
-        screen.until(lambda look: look.ended and look.says("The participant's screen did not start again"))
-        assert screen.close()[0] == 130
-    assert "did not start again" in records(journal)[-1]["reason"]
+        screen.keys.press("p")
+        screen.to("rating", trial=1)
+        code, said = screen.stop()
+    assert code == 130, said
+    assert len(not_again(journal)) == 3
+    assert records(journal)[-1]["reason"] == "enough"
+
+
+def not_again(journal: Path) -> list[str]:
+    """What is on record of a participant's screen that did not start again."""
+    return [one["text"] for one in remarks(journal, "noted") if "did not start again: " in one["text"]]

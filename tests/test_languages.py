@@ -123,7 +123,6 @@ NOT_SHOWN = {
     *COMMANDS_AND_STATES,
     *("participant again", "line of text"),
     *("Recoil – please wait", "Recoil – unfinished run"),
-    "the participant's screen did not start again: {}",  # why a run stopped: in its journal
     "{} QLabel { font-size: 26px; padding: 40px; }",
 }
 """Names of commands, states, threads, fields and windows; what a journal has; how things look."""

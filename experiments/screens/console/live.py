@@ -203,7 +203,11 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))
-        link.wait_ready()
+        try:
+            link.wait_ready()
+        except ParticipantError:
+            link.close()  # a window that came later would be nobody's
+            raise
         link.show(said.wait)
         return link
 

@@ -391,7 +391,7 @@ class ParticipantSide:
         return self._link.failure is not None and not self._starting and not self._closed
 
     def restart(self) -> None:
-        """Start the program again, beside everything else; the run ends if that fails."""
+        """Start the program again, beside everything else; if that fails the run goes on without it."""
         with self._lock:
             if not self.lost:
                 return
@@ -404,7 +404,8 @@ class ParticipantSide:
         try:
             link = self._open_link()
         except ParticipantError as error:
-            self._offer(events.Stop(reason=f"the participant's screen did not start again: {error}"))
+            self._starting = False
+            self._not_again(error)
             return
         noise = None if self._noise is None else noise_of(link)  # before the run, which may go on, asks anything there
         with self._lock:
@@ -417,6 +418,18 @@ class ParticipantSide:
         self._offer(events.ParticipantBack())
         if self._live is not None:
             self.follow(self._live.position)
+
+    def _not_again(self, error: ParticipantError) -> None:
+        """It did not start: said and on record, unless the run has ended meanwhile."""
+        text = phrase(
+            "The participant's screen did not start again: {error}. The run goes on without it; in a pause it can be "
+            "started once more.",
+            error=error,
+        )
+        if not self._closed and self._live is not None:
+            self._see()
+            self._tell(Trouble(text=text))
+            self._live.remark(Noted(trial=None, text=text))
 
     def close(self) -> None:
         """Close the participant's screen."""

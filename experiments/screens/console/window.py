@@ -149,7 +149,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             self.activateWindow()
         self.participant = seen
         if seen.failure:
-            self._forget_good()
+            self._forget()
 
     def _show_soon(self) -> None:
         if not self._soon.isActive():
@@ -162,8 +162,9 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _end(self, message: view.Ended) -> None:
         self.ended = message
+        self._forget("wait")  # what is begun is not done any more
         if message.reason is not None and message.saved is None:
-            self._forget_good()
+            self._forget()
         if self.controls is not None:
             self.controls.end()
         self.close_line()
@@ -178,7 +179,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if view.typed_there(self.about, before) and not view.typed_there(self.about, self.drawn):
             self.activateWindow()  # the participant's screen took the keys
         if self.drawn.base is State.HALTED and before.base is not State.HALTED:
-            self._forget_good()
+            self._forget()
         if self.controls is not None:
             self.controls.draw(self.drawn)
             if self.drawn.serial != self._brief_for:
@@ -194,9 +195,9 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if message.mood == "good":
             self.say(message.text, message.mood)
 
-    def _forget_good(self) -> None:
+    def _forget(self, mood: str = "good") -> None:
         """What went well before is not to stand below an emergency stop, or below what is lost."""
-        if self._lasting[1] == "good":
+        if self._lasting[1] == mood:
             self._last("", "good")
 
     def _acknowledge(self, message: view.Saved) -> None:
