@@ -452,6 +452,21 @@ def test_f12_on_the_participants_window_while_it_is_starting_halts_the_run(
     assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]
 
 
+def test_f12_on_the_window_that_waits_for_the_participants_screen_halts_the_run(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.focus_on("please wait")
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
+        screen.focus_on(RUN)
+        screen.keys.press("q")
+        assert screen.close()[0] == 130
+    assert [one["by"] for one in remarks(journal, "halted")] == ["experimenter"]
+
+
 def test_f12_on_the_participants_window_while_it_is_started_again_halts_the_run(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

@@ -20,7 +20,15 @@ from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
-from experiments.screens.participant.messages import BETWEEN, Focused, NoiseBroken, NoiseEnded, NoiseIs, line
+from experiments.screens.participant.messages import (
+    BETWEEN,
+    EmergencyPressed,
+    Focused,
+    NoiseBroken,
+    NoiseEnded,
+    NoiseIs,
+    line,
+)
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Describe, Rate
@@ -220,6 +228,27 @@ def test_noise_that_may_have_broken_off_is_said_and_on_record(tmp_path: Path) ->
         link.close()
     assert [one.text for one in told if isinstance(one, Trouble)] == [broken]
     assert not any(one.noise_off for one in told if isinstance(one, ParticipantSeen))
+
+
+@pytest.mark.slow
+def test_f12_on_a_screen_that_was_started_again_is_heard_while_its_noise_is_awaited(tmp_path: Path) -> None:
+    first = ParticipantLink.start(command=(sys.executable, "-c", "import sys; sys.stdin.read()"))
+    word = line(EmergencyPressed()).decode().strip()
+    program = f"import sys; sys.stdin.readline(); print({word!r}, flush=True); sys.stdin.read()"
+    again = ParticipantLink.start(command=(sys.executable, "-c", program))
+    told: list[Message] = []
+    try:
+        with sat(PREFERENCE, tmp_path) as sitting:
+            side = beside(first, lambda: again)
+            side.begin(sitting.live, told.append)
+            os.kill(first.pid, signal.SIGKILL)
+            wait_for(lambda: sitting.state is State.PAUSED)
+            side.restart()
+            wait_for(lambda: sitting.state is State.HALTED)
+            assert not [one for one in told if isinstance(one, Trouble) and "there again" in one.text]
+    finally:
+        first.close()
+        again.close()
 
 
 PLAYS = """

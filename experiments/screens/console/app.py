@@ -97,13 +97,12 @@ class Console:
         request: RunRequest,
         clock: Clock,
         *,
-        participant: ParticipantSide | None = None,
         band: str = "",
         last: str = view.THANK_PARTICIPANT,
     ) -> None:
         application()
         self.clock, self._request = clock, request
-        self.participant = participant
+        self.participant: ParticipantSide | None = None
         self._hand: Hand = "synthetic" if request.visual else "experimenter"
         self._band, self._last = band, last
         self.window: ConsoleWindow | None = None
@@ -111,13 +110,17 @@ class Console:
         self.synthetic: SyntheticParticipant | None = None
         self._result: Finished | None = None
         self._error: BaseException | None = None
-        self._leaving, self._failed = "", False
+        self._leaving, self._failed, self._halts = "", False, False
         self._opened, self._over = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="run")
         self._loop, self._bridge = QEventLoop(), _Bridge()
         self._bridge.opening.connect(self._open)
         self._bridge.message.connect(self._take, Qt.ConnectionType.QueuedConnection)  # type: ignore[call-arg] # as Qt has it
         self._tell = self._bridge.message.emit
+
+    def halt_at_once(self) -> None:
+        """The emergency stop was pressed before the run is there: it begins halted."""
+        self._halts = True
 
     def run(self) -> Finished:
         """Carry the run out. Raises what `experiments.run.run` raises.
@@ -247,6 +250,8 @@ class Console:
         self._tell(view.Began(live=live))
         if self._leaving:
             live.offer(events.Stop(reason=self._leaving))
+        if self._halts:
+            live.offer(events.EmergencyStop())
         if self.participant is not None:
             self.participant.begin(live, self._tell)
         threading.Thread(target=self._look_at, args=(live,), daemon=True, name="gun-look").start()

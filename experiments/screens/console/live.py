@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from PyQt6.QtCore import QEventLoop, Qt, QTimer
-from PyQt6.QtGui import QGuiApplication
+from PyQt6.QtGui import QGuiApplication, QKeySequence, QShortcut
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from device.messages import RecoilError
@@ -27,7 +27,7 @@ from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
 from experiments.run import Finished
 from experiments.run_request import Again, RunRequest
-from experiments.screens.console import people, widgets
+from experiments.screens.console import keys, people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
 from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of, noise_of
@@ -63,9 +63,10 @@ def _carry_out(request: RunRequest, last: str) -> Finished:
     check_font(request)
     with ExitStack() as stack:
         rater = open_rater(stack) if request.visual and request.options.screen else None
-        participant = _participant(stack, request) if request.options.any else None
         band, said_last = _band_and_last(request, last)
-        console = Console(request, clock, participant=participant, band=band, last=said_last)
+        console = Console(request, clock, band=band, last=said_last)
+        if request.options.any:
+            console.participant = _participant(stack, request, console.halt_at_once)
         if request.visual:
             stack.enter_context(VisualParticipant(console, rater))
         return console.run()
@@ -192,8 +193,11 @@ def study_of(request: RunRequest) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
-def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
-    """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile."""
+def _participant(stack: ExitStack, request: RunRequest, emergency: Callable[[], None]) -> ParticipantSide:
+    """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile.
+
+    `emergency` is told of F12 in that window.
+    """
     options, said = request.options, request.language.messages
     setup, _ = setup_in(request.language, request.setup)
     check_monitor(options.monitor)
@@ -212,7 +216,7 @@ def _participant(stack: ExitStack, request: RunRequest) -> ParticipantSide:
         return link
 
     try:
-        link = while_shown(phrase("Starting the participant's screen …"), open_link)
+        link = while_shown(phrase("Starting the participant's screen …"), open_link, emergency)
     except ParticipantError as error:
         raise PlaceError(f"--participant-screen: {error}; look at `recoil doctor`, or run without it") from error
     return ParticipantSide(
@@ -292,12 +296,18 @@ _LOOK_MS = 30
 Made = TypeVar("Made")
 
 
-def while_shown(text: str, make: Callable[[], Made]) -> Made:
-    """What `make` gives back, done in a thread of its own while a window shows the text. Raises what it raises."""
+def while_shown(text: str, make: Callable[[], Made], emergency: Callable[[], None] = lambda: None) -> Made:
+    """What `make` gives back, done in a thread of its own while a window shows the text. Raises what it raises.
+
+    `emergency` is told of F12, as is whoever pressed it.
+    """
     shown = QLabel(text)
     shown.setWindowTitle("Recoil – please wait")
     shown.setStyleSheet(f"{widgets.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
     shown.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    stop = QShortcut(QKeySequence(keys.BY_NAME["emergency"].key), shown)
+    stop.activated.connect(lambda: shown.setText(phrase("EMERGENCY STOP")))
+    stop.activated.connect(emergency)
     made: Future[Made] = Future()
 
     def work() -> None:

@@ -407,6 +407,7 @@ class ParticipantSide:
             self._starting = False
             self._not_again(error)
             return
+        link.listen(self._heard, lambda _: None)  # F12 there counts from now on
         noise = None if self._noise is None else noise_of(link)  # before the run, which may go on, asks anything there
         with self._lock:
             self._link, self._shows, self._starting = link, "", False
