@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
+import os
 import re
 import signal
 import sys
+import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from experiments import run as runs
+from experiments.clock import RealClock
+from experiments.live_run import RunStopped
+from experiments.run_request import RunRequest
+from experiments.screens.terminal import TerminalScreen
+from tests.at_controls import gated
 from tests.at_terminal import DAMPER, FIRES, AtTerminal
 from tests.conftest import Recoil
-from tests.waiting import stand_still, wait_for
+from tests.designs import changed
+from tests.waiting import PATIENCE_S, stand_still, wait_for
 from tests.warm_start import warm
 
 pytestmark = pytest.mark.slow
@@ -308,6 +319,38 @@ def test_what_is_typed_while_the_program_stands_still_fires_nothing(quick_config
         assert screen.end() == 130
     assert [one["event"] for one in bodies(tmp_path, "refused")] == ["fire", "fire"]
     assert len(bodies(tmp_path, "fired")) == 1
+
+
+def test_an_answer_that_is_typed_while_the_last_one_is_being_saved_is_on_record_as_what_it_was(tmp_path: Path) -> None:
+    setup = changed("direction", console={"guard_s": 0.0})
+    request = RunRequest(setup=setup, participant_id="P01", results=tmp_path / "results", seed=1, again="ask")
+    ours, theirs = os.pipe()
+    out = io.StringIO()
+    with gated() as gate, os.fdopen(ours) as lines, os.fdopen(theirs, "w", buffering=1) as hand:
+
+        def carried_out() -> None:
+            with suppress(RunStopped):
+                runs.run(request, lambda _, plan, clock: TerminalScreen(plan, clock, lines, out), RealClock())
+
+        sitting = threading.Thread(target=carried_out)
+        sitting.start()
+        for line, asked in (("d", "type d and Enter"), ("", "Enter fires:"), ("f", "b = backward:")):
+            wait_for(lambda asked=asked: asked in out.getvalue())
+            if line == "f":
+                gate.shut()
+            print(line, file=hand)
+        assert gate.holds.wait(PATIENCE_S)
+        for line in ("b", "what?"):
+            print(line, file=hand)
+        wait_for(lambda: out.getvalue().count("One moment: the last step is being saved.") == 2)
+        gate.open()
+        wait_for(lambda: "Saved. Trial 1: FORWARD." in out.getvalue())
+        print("stop", file=hand)
+        sitting.join(PATIENCE_S)
+    assert [(one["event"], one["answer"]) for one in bodies(tmp_path, "refused")] == [
+        ("answer", "backward"),
+        ("answer", "what?"),
+    ]
 
 
 def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp_path: Path) -> None:

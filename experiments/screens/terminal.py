@@ -365,6 +365,9 @@ def _line(line: str, position: Position, now_s: float) -> Event | str | None:  #
             return events.Reason(text=line) if line else events.Stop(reason="emergency stop")
         case State.RESTING:
             return "To end the break early type `skip` and the reason." if line else None
+        case State.SAVING | State.FIRING if line:  # refused, and on record as what was typed
+            response = _chosen(position.step, line) if isinstance(position.step, Ask) else None
+            return events.Answer(response=response or line, at_s=now_s)
         case State.TRAIN | State.CLOSING | State.PREPARING | State.INFORMING if line:
             return "Only Enter, or one of the commands (`help`)."
         case State.TRAIN:
