@@ -287,6 +287,33 @@ def test_a_run_that_is_stopped_keeps_where_the_participants_marker_stood(
     assert [one["text"] for one in remarks(journal, "noted")] == ["participant's rating: 0.0"]
 
 
+def test_what_the_participant_had_written_as_their_program_was_lost_is_kept_as_a_note(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        rated_and_half_described(screen, journal, trial=1)
+        time.sleep(0.5)  # their program tells what stands there as it looks next
+        os.kill(screen.participant_pid, signal.SIGKILL)
+        screen.until(lambda look: look.state == "paused" and look.ready)
+        screen.stands(RUN)
+        screen.keys.press("s")
+        screen.keys.press("p")
+        screen.participant_shows("DescriptionPage", 2)
+        screen.focus_on(PARTICIPANT)
+        screen.keys.type("ft")
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted")
+        screen.focus_on(RUN)
+        screen.keys.press("q")
+        assert screen.close()[0] == 130
+    notes = [one["text"] for one in remarks(journal, "noted") if one["trial"]]
+    assert notes == ["participant's description: so", "participant's description: ft"]
+
+
 def test_a_key_that_loses_to_what_the_experimenter_entered_is_on_record_and_said_until_the_next_trial(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

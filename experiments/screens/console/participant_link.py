@@ -339,7 +339,7 @@ class ParticipantSide:
         return verdict.taken
 
     def keep_draft(self, position: Position) -> None:
-        """Their question goes, or the run does: what they had set or written for it and not given is kept as a note."""
+        """Their question, program or run goes: what they had set or written and not given is kept as a note."""
         draft, step = self._draft, position.step
         if draft is None or draft.draft != position.number or not isinstance(step, Asking):
             return
@@ -382,6 +382,8 @@ class ParticipantSide:
         """The program has ended, and was not told to."""
         if not self._closed:
             self._see()
+            if self._live is not None:
+                self.keep_draft(self._live.position)  # their next page begins empty
             self._offer(events.ParticipantLost(cause=cause))
             self._noise_ends(phrase("Masking noise has ended with the participant's screen, and begins again with it."))
 
