@@ -445,6 +445,21 @@ def test_a_synthetic_participant_rates_on_the_participants_screen_as_in_data_mod
         assert [row[column] for row in seen] == [row[column] for row in expected]
 
 
+def test_a_number_of_any_size_has_no_page_and_is_typed_at_the_console_which_says_so(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    config = quick_configs / "magnitude.toml"
+    config.write_text(config.read_text().replace("sets = 3", "sets = 1").replace("repetitions = 3", "repetitions = 1"))
+    run = words(quick_configs, "magnitude", "--participant", "P01", "--visual", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        code, said = screen.end()
+        asked = [look for look in screen.watch.looks() if look.state == "rating"]
+        assert code == 0, said
+        assert "RatingPage" not in screen.pages
+    assert any(look.says("Type here what they say: it has no page on their screen.") for look in asked)
+    assert not any(look.says("Awaited") for look in asked)
+
+
 def test_where_there_is_no_x_the_synthetic_rating_is_refused_with_one_message(
     quick_configs: Path, tmp_path: Path
 ) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from experiments.live_run import HALT_UNSAVED
 from experiments.screens import texts
 from experiments.screens.console.keys import is_on_buttons
-from experiments.screens.console.view import Ended, Seen, method_text
+from experiments.screens.console.view import Ended, Seen, has_a_page, method_text
 from experiments.screens.phrases import isolated, phrase
 from experiments.screens.practice_text import practice_text, round_before_text
 from experiments.session.history import counting, entered_value
@@ -178,12 +178,19 @@ def _rating(seen: Seen) -> Instruction:
     step = seen.position.step
     if not isinstance(step, Rate | Describe):
         return _MOMENT
-    kind = phrase("words") if isinstance(step, Describe) else what(step)
-    own = phrase("Awaited: the participant's {kind} on their own screen, or typed here.", kind=kind)
-    there = _asked_there(seen, own, phrase("Type here what they say.")) if seen.about.participant_rates else ""
+    there = _typed_where(seen, step) if seen.about.participant_rates else ""
     question = isolated(step.text)
     title, *more = (_order_told(seen, step), question) if step.later else (question,)
     return Instruction(title=title, detail="\n".join(filter(None, (*more, there))), mood="ask")
+
+
+def _typed_where(seen: Seen, step: Rate | Describe) -> str:
+    """Where that is entered, beside a participant's screen for ratings and words."""
+    if not has_a_page(step):
+        return phrase("Type here what they say: it has no page on their screen.")
+    kind = phrase("words") if isinstance(step, Describe) else what(step)
+    own = phrase("Awaited: the participant's {kind} on their own screen, or typed here.", kind=kind)
+    return _asked_there(seen, own, phrase("Type here what they say."))
 
 
 def _order_told(seen: Seen, step: Asking) -> str:

@@ -19,7 +19,7 @@ from experiments.design.shown_texts import letters_of
 from experiments.live_run import LiveRun
 from experiments.run_request import RunRequest
 from experiments.screens.console.keys import choices_at, shared_keys
-from experiments.screens.console.view import Message, ParticipantSeen, Trouble
+from experiments.screens.console.view import Message, ParticipantSeen, Trouble, has_a_page
 from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
@@ -29,7 +29,7 @@ from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, Step, what
+from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, what
 from experiments.study.folders import PlaceError
 from experiments.tasks.questions import choices, first_choices
 
@@ -91,11 +91,6 @@ def look_of(request: RunRequest, screens: int) -> messages.Look:
         right_to_left=language.right_to_left,
         messages=language.messages,
     )
-
-
-def _has_a_page(step: Step | None) -> bool:
-    """Whether something can be asked on the participant's own screen: a scale or words, not any number."""
-    return isinstance(step, Describe) or (isinstance(step, Rate) and step.grain > 0)
 
 
 def noise_of(link: ParticipantLink) -> messages.NoiseIs:
@@ -214,7 +209,7 @@ class ParticipantSide:
         return {one.own_key: one.answer for one in choices_at(position) or self._choices}
 
     def _to_be_shown(self, position: Position) -> str | int:
-        base, by_screen = position.base, self.rates and _has_a_page(position.step)
+        base, by_screen = position.base, self.rates and has_a_page(position.step)
         if State.PAUSED in position.states:
             return PAUSED
         if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):

@@ -185,10 +185,15 @@ class Seen:
         return trial_at(self.about.plan, self.told, self.position.step)
 
 
+def has_a_page(step: Step | None) -> bool:
+    """Whether something can be asked on the participant's own screen: a scale or words, not any number."""
+    return isinstance(step, Describe) or (isinstance(step, Rate) and step.grain > 0)
+
+
 def typed_there(about: About, position: Position) -> bool:
     """Whether the participant's own screen has the keys, for as long as one rating or description follows the other."""
     asked = position.base in (State.RATING, State.DESCRIBING, State.SAVING)
-    return about.participant_rates and asked and isinstance(position.step, Rate | Describe)
+    return about.participant_rates and asked and has_a_page(position.step)
 
 
 def method_code(plan: Plan, trial: Trial) -> str:

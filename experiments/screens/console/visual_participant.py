@@ -12,6 +12,7 @@ from PyQt6.QtTest import QTest
 from device.machine_clock import machine_s
 from experiments.design.plan import Condition
 from experiments.screens.console.app import Console
+from experiments.screens.console.view import has_a_page
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.participant.pages import spot_px
 from experiments.screens.participant.stage import WINDOW_TITLE
@@ -72,7 +73,7 @@ class VisualParticipant:
             return False
         asking = self._console.participant.asking  # only then: what comes later would be done to the next question
         match window.drawn.state:
-            case State.RATING if isinstance(step, Rate):
+            case State.RATING if isinstance(step, Rate) and has_a_page(step):
                 rating = self._synthetic.rate(step.trial, step.question, _chosen(window, step))
                 if rating is not None and asking:
                     self._rater.rate(step, rating)
