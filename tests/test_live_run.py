@@ -27,7 +27,7 @@ from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
-from experiments.session.judging import STOOD_STILL
+from experiments.session.judging import NOTHING_TO_UNDO, STOOD_STILL
 from experiments.session.remarks import (
     HALTED_BEFORE,
     EntryCorrected,
@@ -624,12 +624,20 @@ def test_a_key_that_comes_behind_what_the_experimenter_entered_is_refused_with_i
         same = sitting.live.offer(replace(late, response="forward")).text
         sitting.to(S.PREPARING)
         assert sitting.live.offer(replace(late, timed=False)).text == said[0]
+        undone = []
+        for number in (1, 2):
+            while sitting.live.moment.trial.set < number:
+                sitting.go_on()
+            undone.append(sitting.live.offer(events.Undo()).text)
+            sitting.live.offer(events.Leave())
         contents = of_journal(sitting)
+    corrected = "undo (U) corrects it until its set is over, then a note (N) says it."
     assert said == [
-        "“forward” was entered at the console and taken before “backward” came: undo (U) corrects it.",
+        f"“forward” was entered at the console and taken before “backward” came: {corrected}",
         "“forward” was entered at the console and taken before “backward” came, though that went down 2.00 s earlier: "
-        "undo (U) corrects it.",
+        f"{corrected}",
     ]
+    assert undone == ["", NOTHING_TO_UNDO]
     assert same == "“forward” was entered at the console first: it is the same."
     kept = [word.answer for word in remarks(contents, Refused) if isinstance(word, Refused)]
     assert kept == ["backward", "backward", "forward", "backward"]
