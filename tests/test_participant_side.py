@@ -8,13 +8,14 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages, translated
-from experiments.design.plan import Trial, condition
+from experiments.design import planning
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.screens.console.participant_link import PAUSED, ParticipantSide
@@ -29,29 +30,41 @@ from experiments.screens.participant.messages import (
     NoiseIs,
     line,
 )
+from experiments.screens.texts import ordinal, place_text
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Describe, Rate
-from tests.asked import describe, rate
+from experiments.session.steps import Asking
+from tests.asked import ask, describe, rate
 from tests.at_controls import PREFERENCE, sat
 from tests.waiting import PATIENCE_S, wait_for
 
 SETUP = load_setup("preference")
-PROGRAM = "import sys\nwith open(sys.argv[1], 'wb') as told:\n    for line in sys.stdin.buffer:\n        told.write(line)\n        told.flush()"  # noqa: E501 - a program
-TRIAL = Trial(session=1, set=1, trial=1, levels=condition(method="vibration", direction="forward"))
+PROGRAM = """
+import json, sys
+with open(sys.argv[1], 'wb') as told:
+    for line in sys.stdin.buffer:
+        word = json.loads(line)
+        if word["kind"] == "ping":
+            print(json.dumps({"kind": "pong", "sent_s": word["sent_s"], "there_s": word["sent_s"]}), flush=True)
+            continue
+        told.write(line)
+        told.flush()
+"""
+PLAN = planning.plan_of(SETUP.config, "P01", 1)
+TRIAL = PLAN.trials[0]
 STEP = rate(TRIAL)
 
 
 class Told:
-    """A participant's screen whose program writes down what it is told, and never answers."""
+    """A participant's screen whose program writes down what it is told, and answers nothing that is asked."""
 
     def __init__(self, folder: Path, said: ParticipantMessages = ENGLISH_MESSAGES) -> None:
         self._file = folder / "told"
         self.link = ParticipantLink.start(command=(sys.executable, "-c", PROGRAM, str(self._file)))
         self.side = ParticipantSide(self.link, lambda: self.link, SETUP, rates=True, own_keys=False, said=said)
-        self.side.planned = 3
+        self.side.plan = PLAN
 
-    def at(self, serial: int, *states: State, step: Rate | Describe = STEP) -> None:
+    def at(self, serial: int, *states: State, step: Asking = STEP) -> None:
         self.side.follow(Position(states=states, serial=serial, number=3, step=step))
 
     @property
@@ -120,6 +133,25 @@ def test_between_a_rating_and_its_description_the_participants_window_keeps_the_
     }  # fmt: skip
     asked = next(word for word in told.all if word["kind"] == "ask-description")
     assert (asked["number"], asked["of"], asked["question"]) == (1, 3, "?")
+
+
+def test_a_trial_has_one_number_on_the_participants_screen_and_at_the_console_also_in_a_later_session_or_set(
+    told: Told,
+) -> None:
+    plan = planning.plan_of(load_setup("realism").config, "P01", 1)
+    trial = plan.trials[7]
+    told.side.plan, told.side.own_keys = plan, True
+    told.at(1, State.RATING, step=replace(rate(trial), later=False))
+    wait_for(lambda: told.words == ["ask-rating"])
+    assert (trial.session, place_text(plan, trial)) == (2, "Trial 2 of 6 · set 1 of 1 · session 2 of 2")
+    assert (told.all[-1]["number"], told.all[-1]["of"]) == (2, 6)
+    told.side.plan = plan = planning.plan_of(load_setup("direction").config, "P01", 1)
+    sixth = next(one for one in plan.trials if (one.set, one.trial) == (2, 6))
+    told.at(2, State.SAVING)
+    told.at(3, State.ASKING, step=replace(ask(sixth), later=True))
+    wait_for(lambda: told.words[-1] == "ask-choice")
+    assert ordinal(plan, sixth) == "Trial 1 of 5"
+    assert told.all[-1]["question"] == "1. Which way?"
 
 
 def test_what_stands_between_questions_is_in_the_participants_language(tmp_path: Path) -> None:

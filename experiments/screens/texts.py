@@ -37,10 +37,15 @@ def place_in_set(plan: Plan, trial: Trial) -> tuple[int, int]:
     return block.index(trial) + 1, len(block)
 
 
+def place_in_session(plan: Plan, trial: Trial) -> tuple[int, int]:
+    """The number of a trial in its session, and how many the session has."""
+    return trial.trial, sum(other.session == trial.session for other in plan.trials)
+
+
 def place_text(plan: Plan, trial: Trial) -> str:
     """Where a trial stands: in its session, set and run."""
-    in_session = sum(other.session == trial.session for other in plan.trials)
-    where = phrase("Trial {trial} of {at_most}{count}", trial=trial.trial, at_most=_at_most(plan), count=in_session)
+    number, count = place_in_session(plan, trial)
+    where = phrase("Trial {trial} of {at_most}{count}", trial=number, at_most=_at_most(plan), count=count)
     return " · ".join(filter(None, (where, set_text(plan, trial))))
 
 

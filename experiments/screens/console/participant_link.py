@@ -14,7 +14,7 @@ from experiments.catalogues.fonts import font_for
 from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessages
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Trial
+from experiments.design.plan import Plan, Trial
 from experiments.design.shown_texts import letters_of
 from experiments.live_run import LiveRun
 from experiments.run_request import RunRequest
@@ -23,7 +23,7 @@ from experiments.screens.console.view import Message, ParticipantSeen, Trouble, 
 from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import place_in_set
+from experiments.screens.texts import place_in_session, place_in_set
 from experiments.session import events
 from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
@@ -124,8 +124,8 @@ class ParticipantSide:
         self._shown = {WAIT: said.wait, PAUSED: said.paused, THANKS: said.thanks, messages.BETWEEN: said.between}
         self._choices = first_choices(setup.config)
         self.rates, self.own_keys = rates, own_keys
-        self.planned = 0
-        """How many trials there are: known once the run has begun."""
+        self.plan: Plan | None = None
+        """Known once the run has begun."""
         self._noise, self._hand = noise, hand
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
@@ -141,7 +141,7 @@ class ParticipantSide:
 
     def begin(self, live: LiveRun, tell: Callable[[Message], None]) -> None:
         """Take the place beside a console."""
-        self._live, self._tell, self.planned = live, tell, len(live.plan.trials)
+        self._live, self._tell, self.plan = live, tell, live.plan
         if self._noise is not None:
             self._noise_is(self._noise)
         self._link.listen(self._heard, self._gone)
@@ -254,7 +254,7 @@ class ParticipantSide:
             question = replace(question, once_seen=True)  # it was refused: the next key counts
 
     def _numbered(self, step: Ask) -> str:
-        return self._messages.numbered.format(number=step.trial.trial, question=step.text)
+        return self._messages.numbered.format(number=self._place(step)[0], question=step.text)
 
     def _keyed(self, step: Ask, question: messages.AskChoice, position: Position, wanted: Wanted) -> bool:
         """Have the participant press a key; whether it was taken for the answer."""
@@ -304,11 +304,11 @@ class ParticipantSide:
         history = () if self._live is None else self._live.history
         return tuple(rank for rank in ranks_of_others(history, step) if isinstance(rank, float))
 
-    def _place(self, step: Rate | Describe) -> tuple[int, int]:
-        """By which number a stimulus is named, and of how many: after a block that in its set."""
-        if self._live is None or not step.later:
-            return step.trial.trial, self.planned
-        return place_in_set(self._live.plan, step.trial)
+    def _place(self, step: Asking) -> tuple[int, int]:
+        """By which number a stimulus is named, and of how many, as at the console: after a block that in its set."""
+        if self.plan is None:
+            raise TypeError("nothing is asked before the run has begun")
+        return (place_in_set if step.later else place_in_session)(self.plan, step.trial)
 
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
         number, of = self._place(step)
