@@ -386,7 +386,7 @@ def test_an_answer_that_is_half_typed_is_kept_as_a_note_when_its_question_goes(
         code, said = screen.close() if how == "emergency stop" else screen.stop()
     assert code == 130, said
     texts = [noted["text"] for noted in remarks(journal, "noted")]
-    assert texts == ["rating: 7", "“comment”: like a t"][: 1 + (how == "moved, and went on")]
+    assert texts == ["rating: 7", "description “comment”: like a t"][: 1 + (how == "moved, and went on")]
 
 
 def test_after_an_emergency_stop_a_run_goes_on_only_by_a_held_key_and_a_test_shot(

@@ -164,7 +164,7 @@ def test_a_pause_and_f12_in_a_description_keep_the_rating_and_the_words_so_far(
         code, said = screen.close()
     assert code == 130, said
     assert remarks(journal, "halted") == [{"by": "participant", "kind": "halted"}]
-    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's description: soft"]
+    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's description “comment”: soft"]
     answered = [
         body["value"] for record in records(journal) if (body := record.get("body", {})).get("kind") == "answered"
     ]
@@ -284,7 +284,32 @@ def test_a_run_that_is_stopped_keeps_where_the_participants_marker_stood(
         screen.until(lambda look: look.active)
         code, said = screen.stop()
     assert code == 130, said
-    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's rating: 0.0"]
+    assert [one["text"] for one in remarks(journal, "noted")] == ["participant's rating: 0"]
+
+
+def test_a_marker_that_another_answer_leaves_behind_is_noted_by_its_question_and_that_answer_stands_below(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal = tmp_path / f"{PREFERENCE.replace('preference', 'realism')}_journal.jsonl"
+    run = words(quick_configs, "realism", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        for count, (rating, question) in enumerate((("5", "realism"), ("6", "comfort")), start=1):
+            screen.to("rating", trial=1)
+            screen.participant_shows("RatingPage", count)
+            screen.focus_on(PARTICIPANT)
+            screen.keys.press("Right")
+            time.sleep(0.5)  # their program tells where it stands as it looks next
+            screen.focus_on(RUN)
+            asked = screen.until(lambda look: look.active)
+            screen.keys.type(f"{rating}\n")
+            screen.until(lambda look, asked=asked: look.serial != asked.serial and look.says("Saved. Note."))
+            assert remarks(journal, "noted")[-1]["text"] == f"participant's rating “{question}”: 4"
+        screen.until(lambda look: look.says("Saved. Trial 1, rating “comfort”: 6."))
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        code, said = screen.stop()
+    assert code == 130, said
 
 
 def test_what_the_participant_had_written_as_their_program_was_lost_is_kept_as_a_note(
@@ -311,7 +336,7 @@ def test_what_the_participant_had_written_as_their_program_was_lost_is_kept_as_a
         screen.keys.press("q")
         assert screen.close()[0] == 130
     notes = [one["text"] for one in remarks(journal, "noted") if one["trial"]]
-    assert notes == ["participant's description: so", "participant's description: ft"]
+    assert notes == [f"participant's description “comment”: {half}" for half in ("so", "ft")]
 
 
 def test_a_key_that_loses_to_what_the_experimenter_entered_is_on_record_and_said_until_the_next_trial(

@@ -812,7 +812,7 @@ def test_a_correction_that_is_half_typed_is_kept_as_a_note_unless_it_is_left_or_
         sitting.settle()
         sitting.window.paint()
         contents = of_journal(sitting)
-    kept_as = [Noted(trial=first.trial, text="correction: 2.5")] if how in ("emergency", "stop") else []
+    kept_as = [Noted(trial=first.trial, text="correction of the rating: 2.5")] if how in ("emergency", "stop") else []
     assert remarks(contents, Noted) == kept_as
     assert [one.value for one in remarks(contents, EntryCorrected)] == ([2.5] if how == "enter" else [])
 

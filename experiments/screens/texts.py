@@ -181,6 +181,13 @@ def entry_name(told: History, entry: Asking) -> str:
     return f"{kind} “{entry.question}”" if len(alike) > 1 else kind
 
 
+def kept_text(asked: Asking, given: AnswerValue) -> str:
+    """A note of what was set or typed for a question and not entered: by its name, whatever else was asked."""
+    kind = what(asked)
+    name = kind if asked.question == kind else f"{kind} “{asked.question}”"
+    return f"{name}: {given:g}" if isinstance(given, float) else f"{name}: {given}"
+
+
 def _which(plan: Plan, told: History, entry: Asking) -> str:
     """What an entry is about, and its name where that does not tell it from others of its kind."""
     about, name = about_text(plan, entry), entry_name(told, entry)

@@ -15,7 +15,7 @@ from experiments.screens.console import keys
 from experiments.screens.console.participant_link import ParticipantSide
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, OF_THE_RUN, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import FLAG_RULE, entry_name, typed_line, typed_rating
+from experiments.screens.texts import FLAG_RULE, kept_text, typed_line, typed_rating
 from experiments.session import events
 from experiments.session.events import Event, Hand, Press
 from experiments.session.history import chosen_levels, entered_value
@@ -293,12 +293,12 @@ class Controls:
         if entry is not None and field is not None:
             typed = typed_line(self._view.typed(field))
             if typed not in ("", self.entered_so_far()):
-                self._live.offer(events.Note(text=f"correction: {typed}", trial=entry.trial))
+                self._live.offer(events.Note(text=f"correction of the {kept_text(entry, typed)}", trial=entry.trial))
         if self._participant is not None:
             self._participant.keep_draft(self.drawn)
         step, typed = self.drawn.step, typed_line(self._view.take_typed())
         if typed and isinstance(step, Asking):
-            self._live.offer(events.Note(text=f"{entry_name(self._live.history, step)}: {typed}", trial=step.trial))
+            self._live.offer(events.Note(text=kept_text(step, typed), trial=step.trial))
 
     def _drawn_s(self, response: str) -> float | None:
         """The synthetic participant's response time, if it is its answer that was entered."""

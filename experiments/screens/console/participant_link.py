@@ -23,13 +23,13 @@ from experiments.screens.console.view import Message, ParticipantSeen, Trouble, 
 from experiments.screens.participant import messages
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import place_in_session, place_in_set
+from experiments.screens.texts import kept_text, place_in_session, place_in_set
 from experiments.session import events
 from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, what
+from experiments.session.steps import Ask, Asking, Describe, Inform, Rate
 from experiments.study.folders import PlaceError
 from experiments.tasks.questions import choices, first_choices
 
@@ -340,7 +340,7 @@ class ParticipantSide:
             return
         self._draft = None
         if draft.value != "":
-            self._offer(events.Note(text=f"participant's {what(step)}: {draft.value}", trial=step.trial))
+            self._offer(events.Note(text=f"participant's {kept_text(step, draft.value)}", trial=step.trial))
 
     def _offer(self, event: events.Event) -> None:
         if self._live is not None:

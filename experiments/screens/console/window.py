@@ -28,6 +28,7 @@ from experiments.screens.texts import saved_text
 from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
+from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Failed, Prepared, Rested, trial_of
 from experiments.session.tracks import Tracks, adaptive_tracks
@@ -204,8 +205,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         """Say that it is safe; a tone at the end of a break."""
         self._progress.saved(message.word, self.clock.now())
         text = saved_text(self.about.plan, self.seen.told, message.step, message.word)
-        if isinstance(message.word, Rested):
-            self.say(text, "good")
+        if text and isinstance(message.word, Rested | Noted):
+            self.say(text, "good")  # it may be of what an answer left behind, and does not take that answer's place
         elif text:
             if self._beside and trial_of(message.step) not in (None, self._beside.trial):
                 self._beside = None
