@@ -264,6 +264,42 @@ def test_ranks_on_the_participants_own_screen_do_not_tie(configs: Path, tmp_path
     ]  # fmt: skip
 
 
+def test_a_place_that_a_correction_sets_free_is_free_on_the_participants_page_at_once(
+    configs: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("psychopy")
+    (configs / "places.toml").write_text(RANKED.replace("[12.0, 18.0]", "[12.0, 15.0, 18.0]"))
+    run = words(configs, "places", "--participant", "P01", "--participant-screen")
+    with virtual_display("1400x900") as display, AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("rating", trial=1)
+        screen.participant_shows("RatingPage")
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        screen.keys.type("2\n")
+        screen.until(lambda look: look.state == "rating" and look.trial == 2)
+        screen.participant_shows("RatingPage", 2)
+        screen.focus_on("Recoil: participant")
+        screen.keys.press("Right")  # the middle, which the first one has
+        screen.focus_on(RUN)
+        screen.until(lambda look: look.active)
+        screen.keys.press("u", "Control_L")
+        screen.at("correcting")
+        screen.keys.type("3\n")
+        screen.participant_shows("RatingPage", 3)
+        screen.focus_on("Recoil: participant")
+        screen.keys.press("Return")
+        screen.until(lambda look: look.state == "rating" and look.trial == 3)
+        screen.participant_shows("RatingPage", 4)
+        for name in ("Home", "Return"):
+            screen.keys.press(name)
+        screen.until(lambda look: look.state == "closing" and look.active)
+        screen.to_the_end()
+        code, said = screen.close()
+    assert code == 0, said
+    assert [row["place"] for row in table(tmp_path, "places")] == ["3", "2", "1"]
+
+
 def test_what_is_told_of_an_answer_follows_its_correction_but_for_an_emergency_stop(
     configs: Path, tmp_path: Path
 ) -> None:

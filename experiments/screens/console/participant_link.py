@@ -29,12 +29,14 @@ from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Ask, Asking, Describe, Inform, Rate
+from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, Step
 from experiments.study.folders import PlaceError
 from experiments.tasks.questions import choices, first_choices
 
 WAIT, PAUSED, THANKS = ENGLISH_MESSAGES.wait, ENGLISH_MESSAGES.paused, ENGLISH_MESSAGES.thanks
 
+Shows = str | tuple[int, tuple[float, ...]]
+"""What is to stand there: a text, or a question by the number of its step, with the ranks that others have."""
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
 
@@ -130,8 +132,7 @@ class ParticipantSide:
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
         self._tell: Callable[[Message], None] = lambda _: None
-        self._shows: str | int = WAIT
-        """What is to stand there: a text, or a question by the number of its step."""
+        self._shows: Shows = WAIT
         self._serial = -1
         self._closed = self._starting = False
         self._draft: messages.Draft | None = None
@@ -202,29 +203,29 @@ class ParticipantSide:
                 self._link.show(self._shown.get(shows, shows), tell=told, keep_keys=shows == messages.BETWEEN)
             else:
                 self._link.cancel()
-                threading.Thread(target=self._ask, args=(position,), daemon=True, name="participant").start()
+                threading.Thread(target=self._ask, args=(position, shows), daemon=True, name="participant").start()
 
     def _said(self, position: Position) -> dict[str, str]:
         """The participant's keys, by PsychoPy's names, and what they say: also before anything is asked."""
         return {one.own_key: one.answer for one in choices_at(position) or self._choices}
 
-    def _to_be_shown(self, position: Position) -> str | int:
+    def _to_be_shown(self, position: Position) -> Shows:
         base, by_screen = position.base, self.rates and has_a_page(position.step)
         if State.PAUSED in position.states:
             return PAUSED
         if (base is State.ASKING and self.own_keys) or (base in (State.RATING, State.DESCRIBING) and by_screen):
-            return position.number
+            return position.number, self._taken(position.step)
         if base is State.INFORMING and isinstance(position.step, Inform):
             return position.step.text
         if base is State.SAVING and by_screen:
             return messages.BETWEEN
         return THANKS if base in (State.CLOSING, State.STOPPED) else WAIT
 
-    def _ask(self, position: Position) -> None:
+    def _ask(self, position: Position, shows: Shows) -> None:
         """Ask; a question that was called off is over, one that fails otherwise leaves the answer to the console."""
 
         def wanted() -> bool:
-            return self._shows == position.number
+            return self._shows == shows
 
         try:
             match position.step:
@@ -299,10 +300,10 @@ class ParticipantSide:
             if self._offered(event, step.trial):
                 return  # else a correction gave that rank to another one meanwhile
 
-    def _taken(self, step: Rate) -> tuple[float, ...]:
+    def _taken(self, step: Step | None) -> tuple[float, ...]:
         """The ranks that are no longer free."""
-        history = () if self._live is None else self._live.history
-        return tuple(rank for rank in ranks_of_others(history, step) if isinstance(rank, float))
+        others = ranks_of_others(self._live.history, step) if self._live is not None and isinstance(step, Rate) else {}
+        return tuple(rank for rank in others if isinstance(rank, float))
 
     def _place(self, step: Asking) -> tuple[int, int]:
         """By which number a stimulus is named, and of how many, as at the console: after a block that in its set."""
