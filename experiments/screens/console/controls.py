@@ -12,7 +12,7 @@ from experiments.clock import Clock
 from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
 from experiments.screens.console import keys
-from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.console.participant_link import NOT_LOST, ParticipantSide
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, OF_THE_RUN, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import FLAG_RULE, kept_text, typed_line, typed_rating
@@ -249,9 +249,9 @@ class Controls:
         return keys.why_not(name, self.drawn) or self._nothing_to(name)
 
     def _no_restart(self) -> str:
-        if self._participant is None or not self._participant.lost:
-            return phrase("The participant's screen is not lost.")
-        return "" if self.drawn.state is State.PAUSED else phrase("Pause first: a new window takes the keys.")
+        refused = NOT_LOST if self._participant is None else self._participant.not_lost
+        here = "" if self.drawn.state is State.PAUSED else phrase("Pause first: a new window takes the keys.")
+        return refused or here
 
     def _restart(self) -> None:
         if (refused := self._no_restart()) or self._participant is None:

@@ -40,6 +40,7 @@ Shows = str | tuple[int, tuple[float, ...]]
 Wanted = Callable[[], bool]
 """Whether a question is still to be asked."""
 
+NOT_LOST = phrase("The participant's screen is not lost.")
 
 _ARROWS = ("left", "right", "up", "down")
 _OWN = (*_ARROWS, *"123456789")
@@ -384,14 +385,16 @@ class ParticipantSide:
             self._noise_ends(phrase("Masking noise has ended with the participant's screen, and begins again with it."))
 
     @property
-    def lost(self) -> bool:
-        """Whether the program has ended, and is not being started again."""
-        return self._link.failure is not None and not self._starting and not self._closed
+    def not_lost(self) -> str:
+        """Why the program is not to be started again; empty if it has ended."""
+        if self._starting:
+            return phrase("The participant's screen is being started already.")
+        return NOT_LOST if self._link.failure is None or self._closed else ""
 
     def restart(self) -> None:
         """Start the program again, beside everything else; if that fails the run goes on without it."""
         with self._lock:
-            if not self.lost:
+            if self.not_lost:
                 return
             self._starting = True
         self._see()
