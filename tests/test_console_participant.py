@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from string import ascii_lowercase
 
 import pytest
 
@@ -532,6 +533,35 @@ def test_f12_on_the_window_that_waits_for_the_participants_screen_halts_the_run(
         screen.keys.press("q")
         assert screen.close()[0] == 130
     assert [one["by"] for one in remarks(journal, "halted")] == ["experimenter"]
+
+
+def test_a_note_that_is_typed_while_the_participants_window_comes_again_loses_no_letters_to_it(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("preparing", trial=1)
+        os.kill(screen.participant_pid, signal.SIGKILL)
+        screen.until(lambda look: look.state == "paused")
+        screen.stands(RUN)
+        screen.watch.pages.unlink()
+        screen.keys.press("s")
+        screen.until(lambda look: look.says("Their screen is being started again."))
+        screen.keys.press("s")
+        screen.until(lambda look: look.says("The participant's screen is being started already."))
+        screen.keys.press("n")
+        screen.until(lambda look: look.line)
+        pressed = ""
+        while not screen.watch.pages.exists():
+            pressed += ascii_lowercase[len(pressed) % 26]  # a key that was let go elsewhere is down still
+            screen.keys.press(pressed[-1])
+            time.sleep(0.1)
+        screen.until(lambda look: look.typed.endswith(pressed[-1]))
+        assert len(screen.look().typed) >= len(pressed) - 2
+        screen.keys.press("Escape")
+        code, said = screen.stop()
+    assert code == 130, said
 
 
 def test_f12_on_the_participants_window_while_it_is_started_again_halts_the_run(

@@ -78,6 +78,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._brief_for = -1
         self._lasting, self._failure = ("", "good"), ""
         self._beside: view.Trouble | None = None
+        self._takes_keys = False
         self.theme: Theme = "dark"
         self._scale = 0.0
         self._build()
@@ -145,16 +146,25 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._show_soon()
 
     def _see_participant(self, seen: view.ParticipantSeen) -> None:
-        """How the participant's screen stands; one that was started again came with the keys."""
-        if self.participant is not None and self.participant.starting and not seen.starting:
+        """How the participant's screen stands; one that is started again comes with the keys."""
+        before, self.participant = self.participant, seen
+        if before is not None and before.starting and not seen.starting:
             self.activateWindow()
-        self.participant = seen
+        self._takes_keys = seen.starting
         if seen.failure:
             self._forget()
 
     def _show_soon(self) -> None:
         if not self._soon.isActive():
             self._soon.start()
+
+    def changeEvent(self, event: QEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Once while the participant's screen is started again, take the keys back that its window comes with."""
+        super().changeEvent(event)
+        if event is not None and event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
+            if self._takes_keys:
+                self.activateWindow()
+            self._takes_keys = False
 
     def customEvent(self, event: QEvent | None) -> None:  # noqa: N802 - Qt's name
         """A position is on the screen."""
