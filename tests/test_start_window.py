@@ -923,9 +923,33 @@ def test_the_emergency_stop_of_a_test_shot_says_what_the_gun_reports(opened: Ope
     until(lambda: not window.shots.is_running)
     key(window, "Escape")
     key(window, "T", CTRL)
-    assert window.shots.is_running
-    key(window, "Escape")
+    assert not window.shots.is_running  # none was fired: it is asked again
+    assert "Is the gun where it hurts nobody?" in question(window)
+
+
+@pytest.mark.parametrize("begins", ["Return", "P", "R"])
+def test_after_an_emergency_stop_of_a_test_shot_nothing_begins_before_one_was_fired(
+    begins: str, opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
+    window = opened(gun="simulated")
+    fill(window, "P01")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, "F12")
     until(lambda: not window.shots.is_running)
+    key(window, "Escape")
+    key(window, begins, CTRL)
+    assert window.choice is None
+    assert "A test shot comes first. Is the gun where it hurts nobody?" in question(window)
+    key(window, "S", CTRL)
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Fired"
+    key(window, "Escape")
+    key(window, begins, CTRL)
+    if begins == "Return":
+        key(window, "S", CTRL)  # simulated, all the same
+    assert window.choice is not None
 
 
 def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> None:

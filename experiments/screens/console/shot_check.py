@@ -204,8 +204,9 @@ class ShotPage(QWidget):
         self._gun, self._clock = gun, clock
         self._check: ShotCheck | None = None
         self._setup: Setup[DesignConfig] | None = None
-        self.stopped = False
-        """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
+        self.stopped = self.owed = False
+        """The emergency stop: nothing is fired from this page until it was left, and entered on purpose; and a test
+        shot is owed until one was fired."""
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
         self.told.connect(self._take)
@@ -273,7 +274,7 @@ class ShotPage(QWidget):
         if self._check is None:
             return
         self._check.emergency_stop()
-        self.stopped = True
+        self.stopped = self.owed = True
         self._show(
             phrase("EMERGENCY STOP"),
             DISARMING,
@@ -311,6 +312,7 @@ class ShotPage(QWidget):
         self._check = None
         if told.fired:
             self._method_at += 1
+            self.owed = self.stopped
         title = phrase("EMERGENCY STOP") if self.stopped else phrase("Fired") if told.fired else phrase("Not fired")
         self._show(title, told.text, told.mood)
         self._running(False)

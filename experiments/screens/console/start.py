@@ -233,6 +233,8 @@ class StartWindow(QtWidgets.QWidget):
     # choosing
 
     def _start(self) -> None:
+        if self._shot_is_owed():
+            return
         if self._opening.gun == SIMULATED and not self._simulation_is_known:
             if self._checked(lambda: enrolment.may_run(self._study, self.form.entered())[0]) is not None:
                 self._ask_simulation()  # before anything is on record: they may leave it
@@ -246,11 +248,11 @@ class StartWindow(QtWidgets.QWidget):
             self._leave(self.form.participant_id)
 
     def _practice(self) -> None:
-        if self._admit(practice=True) is not None:
+        if not self._shot_is_owed() and self._admit(practice=True) is not None:
             self._leave(self.form.participant_id, practice=True)
 
     def _training(self) -> None:
-        if self._checked(lambda: True):
+        if not self._shot_is_owed() and self._checked(lambda: True):
             self._leave("training", practice=True, training=True)
 
     def _admit(self, *, practice: bool) -> RunProgress | None:
@@ -379,15 +381,16 @@ class StartWindow(QtWidgets.QWidget):
 
     def _test_shot(self) -> None:
         self._take_back()
-        if self.shots.stopped:
-            sure = Option(text=phrase("It is: test shot"), key="Ctrl+S", do=lambda _: self._enter_shots())
-            self._ask(
-                QuestionBox(
-                    phrase("{stopped} Is the gun where it hurts nobody?", stopped=STOPPED), (sure, self._leave_it())
-                )
-            )
-        else:
+        if not self._shot_is_owed():
             self._enter_shots()
+
+    def _shot_is_owed(self) -> bool:
+        """Whether a test shot comes before all else, as the last one ended by an emergency stop: it is asked for."""
+        if self.shots.owed:
+            text = phrase("{stopped} A test shot comes first. Is the gun where it hurts nobody?", stopped=STOPPED)
+            sure = Option(text=phrase("It is: test shot"), key="Ctrl+S", do=lambda _: self._enter_shots())
+            self._ask(QuestionBox(text, (sure, self._leave_it())))
+        return self.shots.owed
 
     def _enter_shots(self) -> None:
         if self._checked(lambda: True):
@@ -403,7 +406,7 @@ class StartWindow(QtWidgets.QWidget):
     def _leave_shots(self) -> None:
         self.pages.setCurrentIndex(0)
         self._show_choice()
-        self.say(STOPPED if self.shots.stopped else "", "bad")
+        self.say(STOPPED if self.shots.owed else "", "bad")
         self.form.code_again.setFocus()
 
 
