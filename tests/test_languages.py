@@ -121,11 +121,11 @@ _DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef
 COMMANDS_AND_STATES = {"go on", "end break", "no answer", "in progress", "not begun", "emergency stop", "test shot"}
 NOT_SHOWN = {
     *COMMANDS_AND_STATES,
-    *("participant again", "line of text"),
+    *("participant again", "line of text", "correction of the {}", "nothing is asked before the run has begun"),
     *("Recoil – please wait", "Recoil – unfinished run"),
     "{} QLabel { font-size: 26px; padding: 40px; }",
 }
-"""Names of commands, states, threads, fields and windows; what a journal has; how things look."""
+"""Names of commands, states, threads, fields and windows; what a journal has, or an error in the code says; looks."""
 OF_THE_PROGRAM = ("app.py", "windows.py", "visual_participant.py")
 """What these say is for the terminal or the journal."""
 CONSOLE = [*sorted((ROOM / "screens" / "console").glob("*.py")), ROOM / "screens" / "texts.py"]
