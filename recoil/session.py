@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -90,6 +91,7 @@ def _how_to_go_on(request: RunRequest) -> str:
     if not journal.exists():
         return "Nothing of the run had begun."
     options = "".join(f" --{name.replace('_', '-')}" for name, has in request.options.named if has)
+    options += f" --sensor {shlex.quote(request.sensor)}" if request.sensor else ""
     return f"Go on with --resume{options}{way_back_to_gun(journal, request.gun)}."
 
 

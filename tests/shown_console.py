@@ -22,11 +22,12 @@ from device import LinkError
 from experiments import run as runs
 from experiments.clock import RealClock
 from experiments.design.language import QuestionConfig
+from experiments.earlier_run import LEFT_OUT, UNMEASURED
 from experiments.live_run import RunStopped
 from experiments.run_request import RunRequest
 from experiments.screens.console import app
 from experiments.screens.console.keys import ANSWERS
-from experiments.screens.console.view import Ended, ParticipantSeen
+from experiments.screens.console.view import Ended, ParticipantSeen, Trouble
 from experiments.session import events
 from experiments.session.states import State
 from tests.designs import changed, direction_with
@@ -55,7 +56,13 @@ def cut(window: Any) -> list[str]:
 
     kinds = (QLabel, QPushButton, QLineEdit, QProgressBar)
     seen = [widget for kind in kinds for widget in window.findChildren(kind) if _shown(widget)]
-    return [_name(widget) for widget in seen if not _is_whole(widget)]
+    return [_name(widget) for widget in seen if not _is_whole(widget)] + _smaller_than_said(window.notice)
+
+
+def _smaller_than_said(notice: Any) -> list[str]:
+    """What is to be done, where it stands in smaller type than what was said last."""
+    least_px = notice.said.font().pixelSize() if notice.said.text() else 0
+    return [_name(label) for label in notice.labels if _shown(label) and label.font().pixelSize() < least_px]
 
 
 def _shown(widget: Any) -> bool:
@@ -320,6 +327,8 @@ class Turns:
     def rearming(self) -> Iterator[str]:
         yield from self.at(State.REARMING)
         yield "rearming"
+        self.window.take(Trouble(text="\n".join((UNMEASURED, *LEFT_OUT.values()))))
+        yield "rearming, and nothing beside the gun is as it was"
         self.window.live.offer(events.Stop(reason="enough"))
         yield from self._until(lambda: self.window.ended is not None)
 

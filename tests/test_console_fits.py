@@ -17,7 +17,7 @@ pytest.importorskip("PyQt6")
 pytestmark = pytest.mark.slow
 
 TITLE_BAR_PX = 24
-STATES = 29
+STATES = 30
 """States and what can lie over them, as they are shown."""
 
 

@@ -217,7 +217,14 @@ def test_a_rating_off_the_scale_is_asked_again(quick_configs: Path, tmp_path: Pa
         assert screen.end() == 130
 
 
-@pytest.mark.parametrize(("words", "told"), [((), "Go on with --resume."), (("--practice",), "begun anew each time")])
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "Go on with --resume."),
+        (("--sensor", "simulated"), "Go on with --resume --sensor simulated."),
+        (("--practice",), "begun anew each time"),
+    ],
+)
 def test_an_interrupted_run_says_how_to_go_on(
     words: tuple[str, ...], told: str, quick_configs: Path, tmp_path: Path
 ) -> None:

@@ -20,15 +20,17 @@ from experiments.session.states import Position, State
 from experiments.session.steps import Asking, Rate
 
 SIZES_PX = {"title": 46, "damper": 34, "detail": 23}
-FITS = (1.0, 0.88, 0.76, 0.66, 0.56)
-"""How far the type shrinks."""
+SAID_PX = 22
+FITS = ((1.0, 1.0), (1.0, 0.76), (0.88, 0.76), (0.88, 0.66), (0.76, 0.66), (0.66, 0.56), (0.56, 0.5))
+"""How far the type shrinks: that of the instruction, and that of what was said last, which goes first."""
 _PAGE_PX, _LEAST_PX = 20, 9
 
 
 class Notice:
-    """What to do now, the damper, and what belongs to it: three labels."""
+    """What to do now, the damper, and what belongs to it: three labels. And `said`, for what was said last."""
 
     def __init__(self) -> None:
+        self.said = widgets.text_label("saved")
         self.title, self.damper, self.detail = self.labels = [widgets.text_label(name) for name in SIZES_PX]
 
     def put(self, shown: Instruction) -> None:
@@ -40,10 +42,11 @@ class Notice:
         widgets.set_mood(self.title, shown.mood)
         widgets.set_mood(self.damper, shown.mood)
 
-    def size(self, factor: float) -> None:
-        """Give the type so many times its own size."""
+    def size(self, scale: float, fit: tuple[float, float]) -> None:
+        """Give the type its own size by the window's scale, shrunk to a fit."""
         for label, size_px in zip(self.labels, SIZES_PX.values(), strict=True):
-            _size(label, round(size_px * factor), bold=label is not self.detail)
+            _size(label, round(size_px * scale * fit[0]), bold=label is not self.detail)
+        _size(self.said, round(SAID_PX * scale * fit[1]), bold=False)
 
 
 class TextPage(QtWidgets.QWidget):
