@@ -34,6 +34,7 @@ from experiments.screens.texts import ordinal, place_text
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Asking
+from experiments.tasks.questions import choices
 from tests.asked import ask, describe, rate
 from tests.at_controls import PREFERENCE, sat
 from tests.waiting import PATIENCE_S, wait_for
@@ -152,6 +153,19 @@ def test_a_trial_has_one_number_on_the_participants_screen_and_at_the_console_al
     wait_for(lambda: told.words[-1] == "ask-choice")
     assert ordinal(plan, sixth) == "Trial 1 of 5"
     assert told.all[-1]["question"] == "1. Which way?"
+
+
+def test_an_answer_lies_on_the_side_of_its_key(told: Told) -> None:
+    told.side.own_keys = True
+    felt = choices(load_setup("detection").config.questions["felt"])
+    told.at(1, State.ASKING, step=replace(ask(TRIAL), choices=felt))
+    wait_for(lambda: told.words == ["ask-choice"])
+    sides = [(one["answer"], one["key"]) for one in told.all[-1]["answers"]]
+    assert sides == [("no", "left"), ("yes", "right")]
+    told.at(2, State.PREPARING)
+    told.at(3, State.ASKING, step=ask(TRIAL))
+    wait_for(lambda: told.words[-1] == "ask-choice")
+    assert [one["answer"] for one in told.all[-1]["answers"]] == ["forward", "backward"]
 
 
 def test_what_stands_between_questions_is_in_the_participants_language(tmp_path: Path) -> None:

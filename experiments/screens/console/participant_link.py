@@ -43,6 +43,8 @@ Wanted = Callable[[], bool]
 NOT_LOST = phrase("The participant's screen is not lost.")
 
 _ARROWS = ("left", "right", "up", "down")
+_SIDES = {"left": -1, "right": 1}
+"""Where an answer lies among the others by its key; in the order of the design between them."""
 _OWN = (*_ARROWS, *"123456789")
 """Keys that the console leaves to the participant; where it has a field to type in, the arrows alone."""
 
@@ -246,7 +248,8 @@ class ParticipantSide:
         question = messages.AskChoice(
             question=self._numbered(step) if step.later else step.text,
             answers=tuple(
-                messages.KeyedAnswer(answer=one.answer, label=one.label, key=one.own_key) for one in step.choices
+                messages.KeyedAnswer(answer=one.answer, label=one.label, key=one.own_key)
+                for one in sorted(step.choices, key=lambda one: _SIDES.get(one.own_key, 0))
             ),
             onset_s=position.since_s if paused else from_s,  # a key in a pause is no answer
             once_seen=paused or not position.asked_at_onset,  # nor one while their screen still says something else
