@@ -99,13 +99,13 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             phrase("Recoil – {participant_id}, {what}", participant_id=self.about.plan.participant_id, what=what)
         )
         self.bands = [widgets.text_label("band", wrap=False) for _ in range(2)]
-        self.place = widgets.text_label("place")
         self.notice, self.fields, self.side, self.buttons = Notice(), TextFields(), SidePanel(self.about), Buttons(self)
         self.bars = Bars(self.about)
+        self.place, self.saved = widgets.text_label("place"), self.notice.said
         self._main = QtWidgets.QWidget()
         left = widgets.fill(QtWidgets.QVBoxLayout(self._main), *self.notice.labels)
         left.addStretch(1)
-        widgets.fill(left, self.fields.pages, self.buttons.slots, self.fields.bar, self.notice.said)
+        widgets.fill(left, self.fields.pages, self.buttons.slots, self.fields.bar, self.saved)
         across = widgets.fill(QtWidgets.QHBoxLayout(), (self._main, 3), (self.side, 1))
         down = QtWidgets.QVBoxLayout(whole := QtWidgets.QWidget())
         widgets.fill(down, self.place, (across, 1), self.bars, margins=(10, 6, 10, 6))
@@ -247,7 +247,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._show_line(text, mood)
 
     def _show_line(self, text: str, mood: str) -> None:
-        for label in (self.notice.said, self.page.said):
+        for label in (self.saved, self.page.said):
             label.setText(text)
             widgets.set_mood(label, mood)
 
