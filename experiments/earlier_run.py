@@ -294,7 +294,7 @@ def way_back_to_gun(journal: Path, address: str) -> str:
         contents = begun(journal)
         had = contents and gun_felt_last(contents)
         if contents and had and had != next(filter(None, (record.gun for record in reversed(contents.records))), None):
-            return f" and --gun for the gun it had, {_who(had)}"
+            return f" and --gun for {_who(had)}, as nothing was felt on the other yet"
     return f" --gun {shlex.quote(address)}"
 
 

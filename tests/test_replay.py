@@ -598,7 +598,7 @@ def test_a_gun_on_which_nothing_was_fired_is_not_the_one_that_a_run_had(sit: Sit
     records = [one["kind"] for one in raw(sit.at("right", "resume", 12))]
     assert records[8:] == ["resumed", "outcome", "step", "remark"]
     assert len(sit.told) == 1
-    back = " and --gun for the gun it had, shaker:left (version 2)"
+    back = " and --gun for shaker:left (version 2), as nothing was felt on the other yet"
     assert way_back_to_gun(journal, "shaker:right") == back
     sit.at("left", "resume", 24)
     assert len(sit.told) == 1
