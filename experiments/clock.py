@@ -1,14 +1,11 @@
-"""The clock of a run, the machine's own or a virtual one on which breaks take no time; its beats; dates for people."""
+"""The clock of a run: the machine's own, or a virtual one on which breaks take no time; and dates for people."""
 
 from __future__ import annotations
 
-import math
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta, tzinfo
-from itertools import pairwise
 from typing import Protocol
 
 from device.interrupts import AWAKE_S
@@ -37,47 +34,6 @@ class Clock(Protocol):
 
     def go_on_after(self, utc: str) -> None:
         """A run that stopped at this date and time goes on."""
-
-
-STANDSTILL_S = 1.0
-"""A screen that did not look at its keys for so long stood still: as long as a gun that was away may still be armed."""
-
-
-_SETTLED = 3
-"""So many beats in time after that, and what was pressed meanwhile has come."""
-_PROMPT_S = 0.3
-"""Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
-
-
-class Beats:
-    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same program.
-
-    What was pressed in a standstill is dated in it, or as it comes. Where nothing beats, nothing stands still.
-    """
-
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
-        self._lately: tuple[float, ...] = ()
-
-    def beat(self) -> None:
-        """The timer beats. The time is read once: wherever this itself stands still, the next beat is late."""
-        now_s = self._now()
-        self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
-        self._last_s = now_s
-        self._lately = (*self._lately[-_SETTLED:], now_s)
-        if self._in_time == _SETTLED:
-            self._alive_s = now_s
-
-    @property
-    def prompt(self) -> bool:
-        """Whether the last beats came one soon after the other, so that what was pressed before them has come."""
-        return all(later - sooner <= _PROMPT_S for sooner, later in pairwise((*self._lately, self._now())))
-
-    @property
-    def alive_since_s(self) -> float:
-        """Since when; infinity while it stands still, and until what was pressed meanwhile has come."""
-        is_late = self._now() - self._last_s > STANDSTILL_S
-        return math.inf if is_late or self._in_time < _SETTLED else self._alive_s
 
 
 class RealClock:

@@ -16,13 +16,13 @@ from typing import NoReturn, Protocol
 
 from device import DeviceError, Gun, GunStatus
 from device.messages import RecoilError
-from experiments.clock import Beats, Clock
+from experiments.clock import Clock
 from experiments.design.plan import Plan
 from experiments.record.journal import Journal, JournalError, JournalGone
 from experiments.session import events, judging
 from experiments.session.events import DISARMS, TYPED, Event, Press
 from experiments.session.history import GrowingHistory, History
-from experiments.session.judging import Moment, refused, remark_of
+from experiments.session.judging import Beats, Moment, refused, remark_of
 from experiments.session.remarks import OF_HALT, EntryCorrected, Halted, Remark, remark_kind, remark_record
 from experiments.session.states import ARMED, Position, State, entered
 from experiments.session.steps import Answered, Asking, Interrupted, Outcome, Session, Step, step_after, step_record

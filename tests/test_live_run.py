@@ -13,7 +13,6 @@ import pytest
 
 from device import Identity, LimitError, LinkError
 from device.serial_gun.triggering import ARM_WITHIN_S
-from experiments.clock import STANDSTILL_S
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
@@ -27,7 +26,7 @@ from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
-from experiments.session.judging import NOTHING_TO_UNDO, STOOD_STILL
+from experiments.session.judging import NOTHING_TO_UNDO, STANDSTILL_S, STOOD_STILL
 from experiments.session.remarks import (
     HALTED_BEFORE,
     EntryCorrected,

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
 from analysis.report.terminal import Tell, untold
@@ -56,15 +56,18 @@ def process_copies() -> Iterator[None]:
 
 
 def in_copy(work: Work, tell: Tell = untold) -> None:
-    """Do some work that only writes files: in a copy where `process_copies` allows it and a core is idle, else here.
+    """Do some work that only writes files: in a copy where `process_copies` allows it and there are cores, else here.
 
-    `tell` hears of the parts of the work, as late as at the end of `process_copies`.
+    It waits for a core if copies are at work on all. `tell` hears of the parts of the work, as late as at the end of
+    `process_copies`.
     """
     begun = _AT_WORK.get()
-    if begun is None or sys.platform != "linux" or sum(copy.process.is_alive() for copy in begun) >= cores() - 1:
+    if begun is None or sys.platform != "linux" or cores() == 1:
         work(tell)
-    else:
-        begun.append(_begin(work, tell))
+        return
+    while len(alive := [copy.process.sentinel for copy in begun if copy.process.is_alive()]) >= cores():
+        wait(alive)
+    begun.append(_begin(work, tell))
 
 
 def cores() -> int:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from experiments.design.plan import Plan, Trial
 from experiments.session import events, remarks
@@ -20,6 +21,43 @@ STOOD_STILL = "the program stood still for more than 1 s, and nothing was fired 
 HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
+STANDSTILL_S = 1.0
+"""A screen that did not look at its keys for so long stood still: as long as a gun that was away may still be armed."""
+_SETTLED = 3
+"""So many beats in time after that, and what was pressed meanwhile has come."""
+_PROMPT_S = 0.3
+"""Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
+
+
+class Beats:
+    """Since when a screen has looked at its keys without standing still, by a timer that beats in the same program.
+
+    What was pressed in a standstill is dated in it, or as it comes. Where nothing beats, nothing stands still.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
+        self._lately: tuple[float, ...] = ()
+
+    def beat(self) -> None:
+        """The timer beats. The time is read once: wherever this itself stands still, the next beat is late."""
+        now_s = self._now()
+        self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
+        self._last_s = now_s
+        self._lately = (*self._lately[-_SETTLED:], now_s)
+        if self._in_time == _SETTLED:
+            self._alive_s = now_s
+
+    @property
+    def prompt(self) -> bool:
+        """Whether the last beats came one soon after the other, so that what was pressed before them has come."""
+        return all(later - sooner <= _PROMPT_S for sooner, later in pairwise((*self._lately, self._now())))
+
+    @property
+    def alive_since_s(self) -> float:
+        """Since when; infinity while it stands still, and until what was pressed meanwhile has come."""
+        is_late = self._now() - self._last_s > STANDSTILL_S
+        return math.inf if is_late or self._in_time < _SETTLED else self._alive_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,13 +18,14 @@ from PyQt6.QtWidgets import QVBoxLayout, QWidget
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
 from device.methods import drive_of
 from device.words import Drive, Effect
-from experiments.clock import STANDSTILL_S, Clock
+from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
 from experiments.screens.console.widgets import TextLines
 from experiments.screens.phrases import phrase
+from experiments.session.judging import STANDSTILL_S
 
 COUNTDOWN_S = 3
 SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
