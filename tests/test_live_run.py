@@ -26,7 +26,7 @@ from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
-from experiments.session.judging import NOTHING_TO_UNDO, STANDSTILL_S, STOOD_STILL
+from experiments.session.judging import HEARS_LATE, NOTHING_TO_UNDO, STANDSTILL_S, STOOD_STILL
 from experiments.session.remarks import (
     HALTED_BEFORE,
     EntryCorrected,
@@ -216,6 +216,27 @@ def test_a_shot_that_was_asked_for_while_the_screen_stood_still_is_not_fired(cam
         looks_while_it_waits(sitting)
         assert by_hand(sitting, events.Fire())
         assert [one.event for one in remarks(of_journal(sitting), Refused)] == ["fire", "fire"]
+
+
+def test_on_a_computer_too_busy_to_hear_a_stop_nothing_fires_and_the_run_says_why(tmp_path: Path) -> None:
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        looks(sitting, 10)
+        for _ in range(3):
+            sitting.clock.skip(0.5)
+            sitting.live.beats.beat()
+        gets_ready = sitting.clock.by_itself
+        sitting.clock.by_itself = lambda: sitting.clock.skip(0.5) or sitting.live.beats.beat() or gets_ready()
+        assert by_hand(sitting, events.Fire())
+        assert sitting.position.states == (S.PREPARING, S.PAUSED)
+        assert (sitting.position.why, sitting.gun.words[-1]) == (HEARS_LATE, "disarmed")
+        assert "rendered" not in sitting.gun.words
+        sitting.clock.by_itself = gets_ready
+        looks(sitting, 10)
+        looks_while_it_waits(sitting)
+        for event in (events.GoOn(), events.Fire()):
+            assert by_hand(sitting, event)
+        assert sitting.gun.words.count("rendered") == 1
+        assert [one.cause for one in remarks(of_journal(sitting), Paused)] == [HEARS_LATE]
 
 
 @pytest.mark.parametrize("state", [S.PREPARING, S.REARMING])

@@ -18,6 +18,7 @@ from experiments.tasks.questions import on_scale
 REARM_HELD_S = 1.0
 """For so long a key is held to go on after an emergency stop."""
 STOOD_STILL = "the program stood still for more than 1 s, and nothing was fired after it: look where the gun is"
+HEARS_LATE = "this computer is too busy to hear a stop in time, so nothing fires: close what else runs on it"
 HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
@@ -27,6 +28,8 @@ _SETTLED = 3
 """So many beats in time after that, and what was pressed meanwhile has come."""
 _PROMPT_S = 0.3
 """Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
+_LATE_S = 3.0
+"""Nor does anything if that goes on for so long, and the experimenter is told (assumed)."""
 
 
 class Beats:
@@ -38,6 +41,7 @@ class Beats:
     def __init__(self, now: Callable[[], float]) -> None:
         self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
         self._lately: tuple[float, ...] = ()
+        self._late_s = math.inf
 
     def beat(self) -> None:
         """The timer beats. The time is read once: wherever this itself stands still, the next beat is late."""
@@ -45,6 +49,7 @@ class Beats:
         self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
         self._last_s = now_s
         self._lately = (*self._lately[-_SETTLED:], now_s)
+        self._late_s = math.inf if self.prompt else min(self._late_s, now_s)
         if self._in_time == _SETTLED:
             self._alive_s = now_s
 
@@ -52,6 +57,11 @@ class Beats:
     def prompt(self) -> bool:
         """Whether the last beats came one soon after the other, so that what was pressed before them has come."""
         return all(later - sooner <= _PROMPT_S for sooner, later in pairwise((*self._lately, self._now())))
+
+    @property
+    def hears_late(self) -> bool:
+        """Whether that was not so for a while, without a standstill."""
+        return self._now() - self._late_s > _LATE_S
 
     @property
     def alive_since_s(self) -> float:
