@@ -504,35 +504,36 @@ def test_where_there_is_no_x_the_synthetic_rating_is_refused_with_one_message(
     assert done.stderr.count("\n") == 1
 
 
-def test_f12_on_the_participants_window_while_it_is_starting_halts_the_run(
-    quick_configs: Path, tmp_path: Path, display: str
+def is_stopped_by_f12(screen: AtConsole) -> None:
+    """F12, wherever the keys are, halts the run, which is then closed."""
+    screen.keys.press("F12")
+    screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
+    screen.focus_on(RUN)
+    screen.keys.press("q")
+    assert screen.close()[0] == 130
+
+
+def start_their_screen_again(screen: AtConsole) -> None:
+    """Their program is killed, and S is pressed."""
+    screen.stands(RUN)
+    screen.to("preparing", trial=1)
+    os.kill(screen.participant_pid, signal.SIGKILL)
+    screen.until(lambda look: look.state == "paused")
+    screen.stands(RUN)
+    screen.watch.pages.unlink()
+    screen.keys.press("s")
+
+
+@pytest.mark.parametrize(("window", "by"), [(PARTICIPANT, "participant"), ("please wait", "experimenter")])
+def test_f12_while_the_participants_window_is_starting_halts_the_run(
+    window: str, by: str, quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
     run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
     with AtConsole(run, tmp_path, display) as screen:
-        screen.focus_on(PARTICIPANT)
+        screen.focus_on(window)
         assert not screen.watch.pages.exists()  # nothing was shown there yet
-        screen.keys.press("F12")
-        screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
-        screen.focus_on(RUN)
-        screen.keys.press("q")
-        assert screen.close()[0] == 130
-    assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]
-
-
-def test_f12_on_the_window_that_waits_for_the_participants_screen_halts_the_run(
-    quick_configs: Path, tmp_path: Path, display: str
-) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
-    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
-    with AtConsole(run, tmp_path, display) as screen:
-        screen.focus_on("please wait")
-        screen.keys.press("F12")
-        screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
-        screen.focus_on(RUN)
-        screen.keys.press("q")
-        assert screen.close()[0] == 130
-    assert [one["by"] for one in remarks(journal, "halted")] == ["experimenter"]
+        is_stopped_by_f12(screen)
+    assert [one["by"] for one in remarks(tmp_path / f"{DIRECTION}_journal.jsonl", "halted")] == [by]
 
 
 def test_a_note_that_is_typed_while_the_participants_window_comes_again_loses_no_letters_to_it(
@@ -540,13 +541,7 @@ def test_a_note_that_is_typed_while_the_participants_window_comes_again_loses_no
 ) -> None:
     run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
     with AtConsole(run, tmp_path, display) as screen:
-        screen.stands(RUN)
-        screen.to("preparing", trial=1)
-        os.kill(screen.participant_pid, signal.SIGKILL)
-        screen.until(lambda look: look.state == "paused")
-        screen.stands(RUN)
-        screen.watch.pages.unlink()
-        screen.keys.press("s")
+        start_their_screen_again(screen)
         screen.until(lambda look: look.says("Their screen is being started again."))
         screen.keys.press("s")
         screen.until(lambda look: look.says("The participant's screen is being started already."))
@@ -567,24 +562,13 @@ def test_a_note_that_is_typed_while_the_participants_window_comes_again_loses_no
 def test_f12_on_the_participants_window_while_it_is_started_again_halts_the_run(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    journal = tmp_path / f"{DIRECTION}_journal.jsonl"
     run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
     with AtConsole(run, tmp_path, display) as screen:
-        screen.stands(RUN)
-        screen.to("preparing", trial=1)
-        os.kill(screen.participant_pid, signal.SIGKILL)
-        screen.until(lambda look: look.state == "paused")
-        screen.stands(RUN)
-        screen.watch.pages.unlink()
-        screen.keys.press("s")
+        start_their_screen_again(screen)
         screen.focus_on(PARTICIPANT)
         assert not screen.watch.pages.exists()  # nothing was shown there yet
-        screen.keys.press("F12")
-        screen.until(lambda look: look.state == "halted" and look.says("EMERGENCY STOP"))
-        screen.focus_on(RUN)
-        screen.keys.press("q")
-        assert screen.close()[0] == 130
-    assert [one["by"] for one in remarks(journal, "halted")] == ["participant"]
+        is_stopped_by_f12(screen)
+    assert [one["by"] for one in remarks(tmp_path / f"{DIRECTION}_journal.jsonl", "halted")] == ["participant"]
 
 
 @pytest.mark.parametrize("stood_s", [0.7, 2.5])
