@@ -20,7 +20,12 @@ _NAMED = 20
 _SETUPS, _FEW = 3, 5
 """Of more setups than these so many are told, each by so many people and keys."""
 
-_TOGETHER, _REMEDY = "setups (config and gun) and count together: ", "; if that matters, "
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PooledSetups(Problem):
+    """Runs of an experiment that count together though their setups differ; `said` without what to do about it."""
+
+    said: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,18 +73,18 @@ def _told(setups: Mapping[str, list[SetupOfLog]]) -> Problem:
     if len(others) > _SETUPS:
         more, rest = how_many(sum(map(len, others[_SETUPS:])), "run"), len(others) - _SETUPS
         differing += f"; and {more} with {rest} other setups, which the first line of each journal holds"
-    message = (
-        f"{how_many(count, 'run')} of {one.experiment} were made with {len(setups)} {_TOGETHER}"
-        f"{_people(first, most)} with one, {differing}{_REMEDY}analyse them apart: name their folders in a call of "
-        "its own"
+    said = (
+        f"{how_many(count, 'run')} of {one.experiment} were made with {len(setups)} setups (config and gun) and count "
+        f"together: {_people(first, most)} with one, {differing}"
     )
-    return Problem(file=Path(one.study), line=None, column=None, message=message, experiment=one.experiment)
+    message = f"{said}; if that matters, analyse them apart: name their folders in a call of its own"
+    place = Path(one.study)
+    return PooledSetups(file=place, line=None, column=None, message=message, experiment=one.experiment, said=said)
 
 
 def pooled_setups(remarks: Iterable[Problem], experiment: str) -> tuple[str, ...]:
     """What remarks say of an experiment's runs that count together though their setups differ, a sentence a study."""
-    told = (one.message for one in remarks if one.experiment == experiment and _TOGETHER in one.message)
-    return tuple(f"{message.partition(_REMEDY)[0]}." for message in told)
+    return tuple(f"{one.said}." for one in remarks if isinstance(one, PooledSetups) and one.experiment == experiment)
 
 
 def _people(logs: Sequence[SetupOfLog], most: int) -> str:
