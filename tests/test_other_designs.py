@@ -121,7 +121,7 @@ def test_the_frozen_design_is_analysed_though_most_logs_have_the_one_that_was_am
 
 def test_each_study_is_there_with_what_it_froze_itself_beside_one_that_froze_another_design(study: Path) -> None:
     """What a study's amendment left behind is not taken up again because another study froze the same."""
-    other = study.with_name("other")
+    study, other = study.rename(study.with_name("study (2)")), study.with_name("other")
     shutil.copytree(study, other)
     freeze(study, "", RealClock())
     do(study, "P01", "P02")
@@ -132,11 +132,12 @@ def test_each_study_is_there_with_what_it_froze_itself_beside_one_that_froze_ano
     do(other, "P01", "P02")
     logs = read_logs([study / "results", other / "results"])
     assert logs.designs[0].table["participant_id"].unique().tolist() == ["other/P01", "other/P02"]
-    first, second, third = (one.message for one in logs.problems)
-    for left_behind in (first, second):
-        assert f"than preregistration 2 of 'study' freezes: factors.pulse_s.levels = {SHORT}, not {LONG}" in left_behind
+    assert {one.rule for one in logs.problems} == {ONE_DESIGN}
+    first, second, third = sorted((one.message for one in logs.problems), key=lambda one: "1 of 'other'" in one)
+    for left in (first, second):
+        assert f"than preregistration 2 of 'study (2)' freezes: factors.pulse_s.levels = {SHORT}, not {LONG}" in left
     assert f"than preregistration 1 of 'other' freezes: factors.pulse_s.levels = {LONG}, not {SHORT}" in third
-    assert f"(rule: {ONE_DESIGN}), though it is as preregistration 2 of 'study' freezes it; {APART}" in third
+    assert f"(rule: {ONE_DESIGN}), though it is as preregistration 2 of 'study (2)' freezes it; {APART}" in third
 
 
 def test_who_is_left_out_stands_among_the_deviations_though_a_synthetic_run_was_set_aside_for_them(study: Path) -> None:

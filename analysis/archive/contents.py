@@ -13,7 +13,7 @@ from analysis.logs.design_logs import ONE_DESIGN
 from analysis.logs.exclusions import FINISHED, TRUSTED, LeftOut
 from analysis.logs.files import Problem, code_in_name, experiment_in_name
 from analysis.logs.journals import RunFile, journal_of
-from analysis.logs.kinds import IN_REGISTER, kept_out
+from analysis.logs.kinds import IN_REGISTER, NEVER_TOGETHER
 from analysis.logs.reading import Logs
 from experiments.record import journal, storage, tables
 from experiments.record.journal import JournalError
@@ -149,20 +149,18 @@ def _of_run(run: RunFile, state: EntryState, excluded: Collection[str]) -> Entry
 
 
 def _why(problem: Problem) -> EntryState:
-    if f"(rule: {ONE_DESIGN})" in problem.message:
-        return "other design"
-    return "kept out" if problem.message in _KEPT_OUT else "broken"
+    return _BY_RULE.get(problem.rule, "broken")
 
 
 def _data(problem: Problem) -> DataKind | None:
-    """Whose data a log holds that is left out: another kind than the archive's, or as its journal says, if it does."""
+    """Whose data a log holds that is left out: as was read, or as its journal says, if it does."""
+    if problem.data is not None:
+        return problem.data
     head = None
     with suppress(JournalError):
         head = journal.head(Path(journal_of(str(problem.file))))
-    return _KEPT_OUT.get(problem.message) or (None if head is None else data_of(head))
+    return None if head is None else data_of(head)
 
 
-_KEPT_OUT: Mapping[str, DataKind] = {
-    kept_out(kind, first): kind for kind in get_args(DataKind) for first in get_args(DataKind)
-}
-"""What is said of logs of another kind than the first, with theirs."""
+_BY_RULE: Mapping[str, EntryState] = {ONE_DESIGN: "other design", NEVER_TOGETHER: "kept out"}
+"""The states of logs that are sound, and left out by a rule."""

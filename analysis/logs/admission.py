@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
@@ -289,7 +289,8 @@ class LogsSoFar:
         if number in self.studies:
             file, study = Path(self.paths[number // LOGS_A_FILE]), self.studies.pop(number)
             code = "" if nobody else self.codes[number]
-            self.problems.append(BadLogError(said).of(file, code, self.experiments[number], study))
+            problem = BadLogError(said).of(file, code, self.experiments[number], study)
+            self.problems.append(replace(problem, data=self.kinds[number]))
 
     def keep_out(self, first: DataKind) -> None:
         """Leave out the logs of other kinds of data than the first that is there."""

@@ -184,15 +184,13 @@ def log_remarks(logs: Logs) -> tuple[str, ...]:
     return tuple(below(one, name_below(one.file, root).parent) for one in said)
 
 
-_RULE = re.compile(r"\(rule: (.*)\)")
 _COMMAND = re.compile(r"`((?:recoil |--|include_)[^`]*)`")
 
 
 def _by_problem(logs: Logs, one: Problem, name: Path) -> LeftOut:
     """A problem in the words of an exclusion: its rule and the command it names, if it does."""
     said = below(one, name.parent)
-    found, command = _RULE.search(said), _COMMAND.search(said)
-    rule = found[1] if found else TRUSTED
+    command, rule = _COMMAND.search(said), one.rule or TRUSTED
     correct = "correct it (DATA_DICTIONARY.md says what it may hold) and analyse again"
     return LeftOut(
         experiment=one.experiment,

@@ -49,6 +49,8 @@ _RENAMED = (
 _LIKE_A_FOLDER = re.compile(r"sub-[^_.]+(\.(zip|gz|tgz|tar|rar|7z))?", re.IGNORECASE)
 _LACKING = "put back what is missing, unpacked if it was packed, or delete this"
 _FEW = 3
+_RULE = re.compile(r"\(rule: ((?:[^()]|\([^()]*\))*|.*)\)")
+"""What stands in brackets that are closed behind it, with brackets of its own; of a pattern with more of these, all."""
 _LINKED = "a link to a folder, and linked folders are not read, so nobody is read twice; put the folder itself here"
 
 
@@ -56,8 +58,8 @@ _LINKED = "a link to a folder, and linked folders are not read, so nobody is rea
 class Problem:
     """A file, or somebody's part of it, that was left out or needs a word: the place, and why.
 
-    `participant`, `experiment` and `study` (its folder or name) as far as they are known; a person is named where the
-    file's name does not.
+    `participant`, `experiment`, `study` (its folder or name) and whose `data` as far as they are known; a person is
+    named where the file's name does not.
     """
 
     file: Path
@@ -67,6 +69,13 @@ class Problem:
     participant: str = ""
     experiment: str = ""
     study: str = ""
+    data: tables.DataKind | None = None
+
+    @property
+    def rule(self) -> str:
+        """The rule that was broken, as the message has it; empty if it names none."""
+        found = _RULE.search(self.message)
+        return found[1] if found else ""
 
     def __str__(self) -> str:
         named = not self.participant or code_in_name(f"{self.file}_") == self.participant

@@ -7,6 +7,7 @@ with the reason, or stand apart where they were asked for.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -101,5 +102,6 @@ def begun_by_kind(
             found[kind if kind in found else kinds[0]].append(one)
         else:
             bad = BadLogError(kept_out(kind, kinds[0]))
-            others.append(bad.of(Path(run.path), run.participant, run.experiment, run.study))
+            problem = bad.of(Path(run.path), run.participant, run.experiment, run.study)
+            others.append(replace(problem, data=kind))
     return found, others
