@@ -46,10 +46,12 @@ def _answer_unsaved(step: Asking) -> str:
 class RunStopped(RecoilError):  # noqa: N818 - a stop is not an error
     """The run stops here on purpose or for want of a gun; it can be resumed.
 
-    `saved`: the answers that were read back from the disk afterwards; `None` if they were not.
+    `saved`: the answers that were read back from the disk afterwards; `None` if they were not. `halted`: it was an
+    emergency stop that ended it.
     """
 
     saved: int | None = None
+    halted = False
 
 
 class Held(Exception):  # noqa: N818 - what is so, not what went wrong
@@ -121,7 +123,7 @@ class LiveRun:
         self.inbox: deque[Event] = deque()
         self.news = threading.Condition(threading.RLock())
         self.disarming: list[threading.Thread] = []
-        self.halt_unsaved = self.correction_unsaved = False
+        self.halted = self.halt_unsaved = self.correction_unsaved = False
         self._answer_unsaved = ""
         self.beats, self._to_fire_s = Beats(clock.now), math.inf
         self.gun_silence = ""
@@ -187,6 +189,7 @@ class LiveRun:
         """Stand where an event leads; where it disarms, that begins when this is so, and before anything else."""
         before = moment.position
         self._position = judging.moved(moment, event)
+        self.halted = self.halted or self._position.base is State.HALTED
         if isinstance(event, events.Fire | events.Rearm):
             self._to_fire_s = moment.now_s
         if isinstance(event, DISARMS) and (before.base in ARMED or isinstance(event, events.EmergencyStop)):
@@ -266,7 +269,7 @@ class LiveRun:
     def write_stop(self, why: str) -> None:
         """Have on the disk why the run stopped; an emergency stop that was not on record is so from then on."""
         try:
-            self.journal.append("stopped", reason=why)
+            self.journal.append("stopped", reason=why, **({"halted": True} if self.halted else {}))
         except JournalError as error:
             self.fail(error)
 

@@ -142,7 +142,8 @@ def _let_go(gun: Gun, why: BaseException) -> None:
             return
         before = "" if isinstance(why, KeyboardInterrupt) else f"{why}; "
         stop = RunStopped(f"{before}the gun did not close ({error}): {_POWER}")
-        stop.saved = why.saved if isinstance(why, RunStopped) else None
+        if isinstance(why, RunStopped):
+            stop.saved, stop.halted = why.saved, why.halted
         raise stop from why
 
 
@@ -318,9 +319,10 @@ def _to_the_end(
         why = str(stop) or "interrupted"
         desk.live.end(why)
         desk.live.write_stop(why)
-        saved = tables_of_stopped(place, desk.live.journal.read_back(), why)
+        halted = desk.live.halted
+        saved = tables_of_stopped(place, desk.live.journal.read_back(), why, halted=halted)
         if isinstance(stop, RunStopped):
-            stop.saved = saved
+            stop.saved, stop.halted = saved, halted
         raise
     except JournalError as error:
         desk.live.end(str(error))

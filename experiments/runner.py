@@ -181,8 +181,8 @@ class _Runner:
                     self._set |= wanted
                 case events.Fire():
                     return steps.Prepared(settings=step.settings)
-                case events.Repeat(reason=reason):
-                    return self._repeat(reason)
+                case events.Repeat() as again:
+                    return self._repeat(again)
                 case other:
                     raise Unforeseen(other)
 
@@ -191,8 +191,8 @@ class _Runner:
         match self._live.wait():
             case events.Answer() | events.ParticipantKey() as answer:
                 return self._answered(step, answer)
-            case events.Repeat(reason=reason):
-                return self._repeat(reason)
+            case events.Repeat() as again:
+                return self._repeat(again)
             case other:
                 raise Unforeseen(other)
 
@@ -225,8 +225,8 @@ class _Runner:
                 return steps.Informed()
             case events.Correct():  # of the answer that is told of: it is told anew
                 return steps.Interrupted(presented=False, cause="correction")
-            case events.Repeat(reason=reason):
-                return self._repeat(reason)
+            case events.Repeat() as again:
+                return self._repeat(again)
             case other:
                 raise Unforeseen(other)
 
@@ -241,8 +241,8 @@ class _Runner:
                     return self._rested(start_s, "")
                 case events.EndBreak(reason=reason):
                     return self._rested(start_s, reason)
-                case events.Repeat(reason=reason):
-                    return self._repeat(reason)
+                case events.Repeat() as again:
+                    return self._repeat(again)
                 case other:
                     raise Unforeseen(other)
 
@@ -254,8 +254,8 @@ class _Runner:
         match self._live.wait():
             case events.Rating(rating=rating, by=by) | events.ParticipantRated(rating=rating, by=by):
                 return steps.Answered(value=None if rating is None else on_scale(rating, step), by=by)
-            case events.Repeat(reason=reason):
-                return self._repeat(reason)
+            case events.Repeat() as again:
+                return self._repeat(again)
             case other:
                 raise Unforeseen(other)
 
@@ -272,16 +272,16 @@ class _Runner:
         match self._live.wait():
             case events.Finish():
                 return steps.Closed()
-            case events.Repeat(reason=reason):
-                return self._repeat(reason)
+            case events.Repeat() as again:
+                return self._repeat(again)
             case other:
                 raise Unforeseen(other)
 
-    def _repeat(self, reason: str) -> steps.Repeated:
+    def _repeat(self, again: events.Repeat) -> steps.Repeated:
         trial = self._live.moment.repeatable
         if trial is None:
             raise TypeError("a repeat of no trial was taken")
-        return steps.Repeated(trial=trial, reason=reason)
+        return steps.Repeated(trial=trial, reason=again.reason, by=again.by)
 
     # the gun
 

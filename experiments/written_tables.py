@@ -30,13 +30,13 @@ def tables_of_finished(place: Place, contents: Contents) -> int:
         raise PlaceError(f"the run is finished, and {_unwritten(place, error)}") from error
 
 
-def tables_of_stopped(place: Place, contents: Contents, why: str) -> int:
+def tables_of_stopped(place: Place, contents: Contents, why: str, *, halted: bool) -> int:
     """As `write_tables`, of a run that was stopped. `RunStopped`: they cannot be written, by which nothing is lost."""
     try:
         return write_tables(place, contents)
     except OSError as error:
         stop = RunStopped(f"{why}; {_unwritten(place, error)}")
-        stop.saved = answers_in(contents)
+        stop.saved, stop.halted = answers_in(contents), halted
         raise stop from error
 
 

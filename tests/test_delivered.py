@@ -29,18 +29,24 @@ from device.sensor.process import ShotReply
 from device.sensor.simulated import SimulatedSensor
 from device.sensor.streams import SensorError
 from device.sensor.turn import ExpectedTurn
-from experiments.clock import RealClock, VirtualClock
+from experiments.clock import Clock, RealClock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.delivered import recorder
 from experiments.design.config import DesignConfig
+from experiments.design.plan import Plan
 from experiments.earlier_run import UNMEASURED
 from experiments.load import load_setup
 from experiments.rebuild import shots_table, table
 from experiments.record import storage
 from experiments.record.journal import Contents, ending_of, read_journal
+from experiments.record.replay import history
 from experiments.run import Finished, run
 from experiments.run_request import RunRequest
-from experiments.screens.synthetic import synthetic_screen
+from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
+from experiments.session import events
+from experiments.session.states import Position, State
+from experiments.session.steps import Fired, Repeated
+from experiments.synthetic.answers import synthetic_participant_of
 from experiments.watch.runs import RunSoFar
 from tests.at_controls import short_direction
 from tests.delivered_chain import DAMPED, RATE_HZ, course, measured_shot, seen
@@ -224,10 +230,13 @@ def rows_of(data: bytes | None) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(data.decode(), newline="")))
 
 
+SLIPPING = "simulated:slip=0.3,after=10"
+
+
 @pytest.fixture(scope="module")
 def drilled(tmp_path_factory: pytest.TempPathFactory) -> Contents:
     """A run whose damper slips by three tenths after ten shots; trials that were not delivered come again."""
-    done = run_with(tmp_path_factory.mktemp("drill"), "simulated:slip=0.3,after=10", repeat=True)
+    done = run_with(tmp_path_factory.mktemp("drill"), SLIPPING, repeat=True)
     assert done.place.shots.read_bytes() == shots_table(read_journal(done.place.journal))
     return read_journal(done.place.journal)
 
@@ -240,7 +249,7 @@ def test_every_shot_of_a_run_is_measured_and_stands_in_the_journal_and_a_table(d
         record for record in drilled.records if isinstance(record.body, dict) and record.body.get("kind") == "fired"
     ]
     assert len(shots) == kinds["measured"] == len(fired)
-    assert all(row["delivered_peak_m_s2"] and row["sensor"] == "simulated:slip=0.3,after=10" for row in shots)
+    assert all(row["delivered_peak_m_s2"] and row["sensor"] == SLIPPING for row in shots)
     onsets = [float(row["delivered_onset_s"]) for row in shots]
     assert max(map(abs, onsets)) < 5e-4
 
@@ -264,6 +273,33 @@ def test_what_was_not_delivered_is_marked_and_comes_again_once(drilled: Contents
         if (row["session"], row["trial"]) in {(s["session"], s["trial"]) for s in last}
     )
     assert all(row["method"] != "vibration" for row in shots if row["mark"])
+
+
+class RepeatingScreen(SyntheticScreen):
+    """An experimenter who has the trial of a shot again, by its number in the run, and says why as a sensor would."""
+
+    shot = 10
+
+    def act(self, position: Position, until_s: float | None) -> None:
+        live = self._live
+        fired = 0 if live is None else sum(isinstance(word, Fired) for _, word in live.history)
+        if live is not None and position.state is State.ASKING and fired == self.shot:
+            self.shot = 0
+            assert live.offer(events.Repeat(reason="not delivered: they say"))
+        else:
+            super().act(position, until_s)
+
+
+def test_what_an_experimenter_says_of_a_repeat_keeps_none_from_coming_that_the_sensor_asks_for(tmp_path: Path):
+    def screen(setup: Setup[DesignConfig], plan: Plan, clock: Clock) -> RepeatingScreen:
+        return RepeatingScreen(setup.config, synthetic_participant_of(setup, plan), clock)
+
+    request = RunRequest(
+        setup=short_design(repeat=True), participant_id="P01", results=tmp_path, sensor=SLIPPING, seed=3
+    )
+    done = read_journal(run(request, screen, VirtualClock()).place.journal)
+    again = [word for _, word in history(done) if isinstance(word, Repeated)]
+    assert [one.by for one in again if one.trial == again[0].trial] == ["experimenter", "sensor"]
 
 
 def test_whoever_watches_reads_of_it(drilled: Contents):

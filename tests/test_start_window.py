@@ -298,10 +298,11 @@ def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_t
 
 
 @pytest.mark.parametrize("practice", [True, False])
-@pytest.mark.parametrize(("reason", "owed"), [("emergency stop", True), ("enough", False)])
+@pytest.mark.parametrize("halted", [True, False])
 def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_first(
-    practice: bool, reason: str, owed: bool, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
+    practice: bool, halted: bool, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """What was typed, as “emergency stop practised”, is none."""
     request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results, practice=practice)
     choices, told = [request, None], list[str]()
 
@@ -310,13 +311,15 @@ def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_fir
         return choices.pop(0)
 
     def stops(*_: object, **__: object) -> None:
-        raise RunStopped(reason)
+        stop = RunStopped("emergency stop practised")
+        stop.halted = halted
+        raise stop
 
     monkeypatch.setattr(live, "choose_run", choose)
     monkeypatch.setattr(live, "run_live", stops)
     live.lab_day(request, (), lambda *_: nullcontext())
-    assert f"P01 stopped: {reason}." in told[1]
-    assert told[1].endswith("begins with a test shot, and so does the next run on that gun.") is owed
+    assert "P01 stopped: emergency stop practised." in told[1]
+    assert told[1].endswith("begins with a test shot, and so does the next run on that gun.") is halted
 
 
 def test_f12_is_said_to_be_heard_where_nothing_is_armed(opened: Open) -> None:

@@ -40,8 +40,6 @@ SETTLED_S = 8.0
 """So long the end of a run waits for what was measured last."""
 UNMEASURED_SHOTS = 3
 """So many shots in a row that were not measured are told of."""
-REPEAT_REASON = "not delivered"
-"""The reason of every repeat that a sensor asks for begins so."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +153,7 @@ class ShotRecorder:
         live, wanted = self._live, self._spoiled
         if live is None or wanted is None:
             return
-        event, moment = events.Repeat(reason=wanted.reason, trial=wanted.trial), live.moment
+        event, moment = events.Repeat(reason=wanted.reason, trial=wanted.trial, by=wanted.by), live.moment
         if not judging.event_refusal(moment, event, None):
             self._spoiled = None
             live.offer(event)
@@ -266,8 +264,8 @@ class ShotRecorder:
     def _want_again(self, live: LiveRun, found: ShotMeasured) -> None:
         """Where the design says so, the trial is to come again, once."""
         before = (word for _, word in live.history if isinstance(word, Repeated) and word.trial == found.trial)
-        if self._again and not any(word.reason.startswith(REPEAT_REASON) for word in before):
-            self._spoiled = Repeated(trial=found.trial, reason=f"{REPEAT_REASON}: {found.because}")
+        if self._again and not any(word.by == "sensor" for word in before):
+            self._spoiled = Repeated(trial=found.trial, reason=f"not delivered: {found.because}", by="sensor")
 
     def _tell_undelivered(self) -> None:
         """Tell the experimenter of a presentation's shots that were not delivered, in one line."""

@@ -54,9 +54,9 @@ class Record:
     """A line of a journal after its first: when it was written, and what it holds.
 
     `body` is a step, outcome, shot, remark or a sensor's word as JSON, which their own types read. `shown_s` of an
-    outcome is when the console had painted its step, `reason` of a stop is why, `clock` and `gun` of a beginning or a
-    resumption are which, `noise`, `participant_screen` and `participant_keys` whether the participant was to have them;
-    else they are empty.
+    outcome is when the console had painted its step, `reason` of a stop is why, `halted` that it was an emergency stop,
+    `clock` and `gun` of a beginning or a resumption are which, `noise`, `participant_screen` and `participant_keys`
+    whether the participant was to have them; else they are empty.
     """
 
     n: int
@@ -67,6 +67,7 @@ class Record:
     body: object = None
     shown_s: float | None = None
     reason: str = ""
+    halted: bool = False
     clock: str = ""
     gun: Identity | None = None
     noise: bool = False

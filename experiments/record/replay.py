@@ -10,7 +10,6 @@ from experiments.record.journal import Contents, JournalError, Record, read_as
 from experiments.session import steps
 from experiments.session.history import GrowingHistory, History, asked_before
 from experiments.session.remarks import HALTED_BEFORE, OF_HALT, REMARK, EntryCorrected, Noted, Remark, TestShot
-from experiments.session.states import EMERGENCY
 from experiments.tasks.questions import AnswerValue
 
 
@@ -30,8 +29,8 @@ class RunPosition:
 def last_word_on_gun(contents: Contents, gun: str | None = None) -> tuple[str, bool]:
     """When an emergency stop or a test shot after one is on record last, and whether it is the stop; "" if none is.
 
-    The stop is its record, its reason, that a test shot was owed before or, where the disk took none of them, why the
-    run stopped. Without any, a shot says that none was owed. `gun`: the word on this one alone, by its name.
+    The stop is its record, its reason, that a test shot was owed before or, where the disk took none of them, that
+    the run stopped by it. Without any, a shot says that none was owed. `gun`: the word on this one alone, by its name.
     """
     last, fired, on = ("", False), "", ""
     for line in contents.records:
@@ -40,7 +39,7 @@ def last_word_on_gun(contents: Contents, gun: str | None = None) -> tuple[str, b
             continue
         word = _remark(contents, line) if line.kind == "remark" else None
         owed = isinstance(word, OF_HALT) or (isinstance(word, Noted) and word.text == HALTED_BEFORE)
-        if owed or (line.kind == "stopped" and line.reason == EMERGENCY):
+        if owed or (line.halted):
             last = line.utc, True
         elif isinstance(word, TestShot) and not word.cause:
             last = line.utc, False

@@ -25,7 +25,7 @@ from experiments.session import events
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
 from experiments.session.remarks import Remark, flag_word
-from experiments.session.states import Position, State
+from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step
 
 if TYPE_CHECKING:
@@ -362,7 +362,7 @@ def _line(line: str, position: Position, now_s: float) -> Event | str | None:  #
         case State.CORRECTING:
             return _correction(line, position)
         case State.HALTED:
-            return events.Reason(text=line) if line else events.Stop(reason="emergency stop")
+            return events.Reason(text=line) if line else events.Stop(reason=EMERGENCY)
         case State.RESTING:
             return "To end the break early type `skip` and the reason." if line else None
         case State.SAVING | State.FIRING if line:  # refused, and on record as what was typed

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from experiments.design.plan import Trial
+from experiments.session.steps import RepeatedBy
 from experiments.tasks.questions import AnswerValue
 
 Hand = Literal["experimenter", "synthetic"]
@@ -142,6 +143,7 @@ class Repeat(Event):
 
     reason: str
     trial: Trial | None = None
+    by: RepeatedBy = "experimenter"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -281,12 +281,17 @@ class Interrupted:
     kind: Literal["interrupted"] = "interrupted"
 
 
+RepeatedBy = Literal["experimenter", "sensor"]
+"""Who had a trial presented again."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repeated:
     """A trial was spoiled, this one or an earlier one of its set, and is to be presented again."""
 
     trial: Trial
     reason: str
+    by: RepeatedBy = "experimenter"
     kind: Literal["repeat"] = "repeat"
 
 

@@ -21,7 +21,7 @@ from experiments.screens import texts
 from experiments.session import events, remarks, steps
 from experiments.session.duration import Ahead, RunTiming, remaining_s
 from experiments.session.history import done, trial_at
-from experiments.session.states import EMERGENCY, Position, State, after, entered
+from experiments.session.states import Position, State, after, entered
 from experiments.study.folders import data_of
 
 WatchedState = Literal[
@@ -134,7 +134,7 @@ class RunSoFar:
         self.faults: list[Fault] = []
         self.sync: SyncTimes | None = None
         self.end: Literal["", "stopped", "finished"] = ""
-        self.reason = ""
+        self.reason, self._halted = "", False
         self.broken = False
 
     def add(self, records: Sequence[Record]) -> None:
@@ -173,7 +173,7 @@ class RunSoFar:
             case "resumed":
                 self._resumed(record)
             case "stopped" | "finished":
-                self.end, self.reason = record.kind, record.reason
+                self.end, self.reason, self._halted = record.kind, record.reason, record.halted
 
     def _synced(self, record: Record) -> None:
         """How long the record before took to be on the disk, as this one tells."""
@@ -210,10 +210,10 @@ class RunSoFar:
         """The run goes on, on a clock that may be another; after an emergency stop a test shot comes first."""
         if not self.end:
             self.faults.append(Fault(utc=record.utc, what="the run had broken off without an end on record; resumed"))
-        halted = State.HALTED in self._position.states or self.reason == EMERGENCY
+        halted = State.HALTED in self._position.states or self._halted
         self._position = Position(states=(State.REARMING,)) if halted else Position()
         self._timing = RunTiming(measured_s=self._timing.measured_s)
-        self._open, self.end, self.reason = (), "", ""
+        self._open, self.end, self.reason, self._halted = (), "", "", False
 
     def _note(self, word: object, record: Record) -> None:
         what = fault_text(word)

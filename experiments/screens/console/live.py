@@ -38,7 +38,6 @@ from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, Question
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
-from experiments.session.states import EMERGENCY
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 
@@ -147,7 +146,7 @@ def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
     try:
         run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment))
     except RunStopped as stop:
-        return _stopped(choice, str(stop))
+        return _stopped(choice, str(stop), halted=stop.halted)
     except NotAsItBegan as other:
         return phrase("{refusal}, or press Start and choose “{set_aside}”.", refusal=other.refusal, set_aside=SET_ASIDE)
     except UnfinishedRun as left:
@@ -157,10 +156,10 @@ def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
     return ""
 
 
-def _stopped(choice: RunRequest, reason: str) -> str:
+def _stopped(choice: RunRequest, reason: str, *, halted: bool) -> str:
     if choice.training:
         return phrase("The training stopped: {reason}.", reason=reason)
-    if not reason.startswith(EMERGENCY):
+    if not halted:
         return _stopped_at(choice, reason)
     owed = phrase("Whatever they do next begins with a test shot, and so does the next run on that gun.")
     return f"{_stopped_at(choice, reason)} {owed}"
