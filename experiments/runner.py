@@ -305,7 +305,7 @@ class _Runner:
 
 
 EMPTY_S = 0.05
-"""So long after the key to fire nothing is felt: about as long as a gun takes to arm and fire (assumed)."""
+"""So long a gun takes to arm and fire, before it has fired (assumed)."""
 LEAD_S = 0.03
 """How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
 
@@ -326,6 +326,7 @@ class DeskGun:
 
     def __init__(self, desk: Desk) -> None:
         self._desk, self._live = desk, desk.live
+        self._took_s = EMPTY_S  # the gun's last shot, armed for it alone
 
     def fire(
         self, step: steps.FireShot, not_before_s: float | None = None
@@ -333,6 +334,7 @@ class DeskGun:
         """One shot, armed for it alone; in a catch trial, or an empty interval, nothing is armed and nothing fires."""
         felt = step.trial.with_chosen(step.chosen)
         levels, asked, before = felt.levels_at(step.interval), False, step.interval > 0
+        began_s = self._live.clock.now()
         shot = None if levels is None else self._desk.stimuli.of_levels(levels)
         try:
             if shot is None:
@@ -340,6 +342,7 @@ class DeskGun:
             self._get_ready(State.FIRING, step, not_before_s)
             asked = True
             onset_utc, report = self._first(shot)
+            self._took_s = self._live.clock.now() - max(not_before_s or 0.0, began_s)
         except Held:
             return steps.Interrupted(presented=before, cause="pause")
         except DeviceError as error:
@@ -350,9 +353,9 @@ class DeskGun:
         return _recorded(steps.Fired, report, gun=self._live.gun_name, onset_utc=onset_utc)
 
     def _nothing(self, step: steps.FireShot, not_before_s: float | None) -> steps.Fired:
-        """What is felt of no shot, in about the time that one takes. Raises as `allow_shot`."""
+        """What is felt of no shot, in the time that the last one took. Raises as `allow_shot`."""
         self._live.enter(State.FIRING, step)
-        self._live.sleep(max(not_before_s or 0.0, self._live.clock.now() + EMPTY_S))
+        self._live.sleep(max(not_before_s or 0.0, self._live.clock.now()) + self._took_s)
         utc, now_s = self._live.clock.utc(), self._live.clock.now()
         self._live.stimulus_begins(now_s)
         return steps.Fired(

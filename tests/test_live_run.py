@@ -651,7 +651,7 @@ def test_a_key_that_comes_behind_what_the_experimenter_entered_is_refused_with_i
             undone.append(sitting.live.offer(events.Undo()).text)
             sitting.live.offer(events.Leave())
         contents = of_journal(sitting)
-    corrected = "undo (U) corrects it until its set is over, then a note (N) says it."
+    corrected = "undo corrects it until its set is over, then a note says it."
     assert said == [
         f"“forward” was entered at the console and taken before “backward” came: {corrected}",
         "“forward” was entered at the console and taken before “backward” came, though that went down 2.00 s earlier: "
@@ -1500,11 +1500,12 @@ def test_a_key_that_went_into_what_is_open_on_the_console_is_nobodys_answer(tmp_
 
 
 @pytest.mark.parametrize("where", ["at the console", "on the participant's screen"])
+@pytest.mark.parametrize(("line", "noted"), [("E", "break: bored"), ("N", "bored"), ("G", "flag: bored")])
 def test_an_emergency_stop_takes_a_line_away_that_was_being_typed_and_keeps_it_as_a_note(
-    where: str, tmp_path: Path
+    line: str, noted: str, where: str, tmp_path: Path
 ) -> None:
     with sat_at(S.RESTING, tmp_path) as sitting:
-        sitting.press("E")
+        sitting.press(line)
         sitting.window.type_text("bored")
         if where == "at the console":
             sitting.press("F12")
@@ -1518,7 +1519,7 @@ def test_an_emergency_stop_takes_a_line_away_that_was_being_typed_and_keeps_it_a
         sitting.press("Q")
         sitting.finish()
         contents = of_journal(sitting)
-    assert [note.text for note in remarks(contents, Noted)] == ["break: bored"]
+    assert [note.text for note in remarks(contents, Noted)] == [noted]
     assert [why.text for why in remarks(contents, HaltReason)] == ["it smelt"]
     assert [line.reason for line in contents.records if line.kind == "stopped"] == ["emergency stop"]
 

@@ -2,6 +2,7 @@ import csv
 import os
 from collections import Counter
 from contextlib import closing, nullcontext, suppress
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ from experiments.run_request import RunRequest
 from experiments.runner import MAX_FAILURES
 from experiments.screens.synthetic import SyntheticScreen, synthetic_screen
 from experiments.session.remarks import Remark
-from experiments.session.steps import Outcome, Step
+from experiments.session.steps import NO_MOTION, Outcome, Step
 from experiments.study.folders import PlaceError, place
 from experiments.synthetic.answers import synthetic_participant_of
 from tests.designs import changed
@@ -97,6 +98,29 @@ def test_shots_of_a_train_come_at_whole_multiples_of_the_interval(tmp_path: Path
         first = sum(shots[:train])
         of_train = times[first : first + shots[train]]
         assert [time - of_train[0] for time in of_train] == pytest.approx(list(range(len(of_train))), abs=1e-6)
+
+
+def test_a_catch_trial_comes_to_its_question_as_late_as_the_shot_before(tmp_path: Path) -> None:
+    class Slow(TroubledGun):
+        def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+            desk.clock.sleep(0.18)
+            return super().fire(shot, at_s)
+
+    desk = sitting("detection", tmp_path, setup=load_setup("detection"))
+    slow = Slow(desk.setup, desk.clock, {})
+    desk = desk._replace(gun=slow)
+    desk.screen.gun = slow
+    desk.carry_out()
+    outcomes = [one for one in raw(desk.where.journal) if one["kind"] == "outcome"]
+    took = [
+        (after["body"]["motion"] == NO_MOTION, after["monotonic_s"] - before["monotonic_s"])
+        for before, after in pairwise(outcomes)
+        if after["body"]["kind"] == "fired"
+    ]
+    since = took.index(next(one for one in took if not one[0]))
+    assert {of_none for of_none, _ in took[since:]} == {True, False}
+    assert [s for _, s in took[since:]] == pytest.approx([took[since][1]] * len(took[since:]), abs=1e-3)
+    assert took[since][1] > 0.17
 
 
 def test_a_virtual_run_takes_the_planned_time(tmp_path: Path) -> None:

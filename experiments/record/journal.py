@@ -94,7 +94,7 @@ class Head(Record):
     """The first line of a journal: the frozen plan, and the resolved setup as JSON, with their hashes.
 
     `laws_json`: how synthetic people answer the design, `None` where nothing says so. `participant`: who was to do it.
-    `preregistration_sha256`: empty where nothing was frozen. `language`: `None` is English. `provenance`: versions, system.
+    `preregistration_sha256`: empty where nothing was frozen. `language`: `None` is English. `provenance`: versions.
     """
 
     path: Path

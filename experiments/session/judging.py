@@ -253,7 +253,7 @@ def _entered_first(moment: Moment, event: Event) -> str:
     if isinstance(entered, events.Answer) and isinstance(event, events.ParticipantKey) and event.timed:
         earlier_s = (entered.at_s or -math.inf) - event.at_s
     though = f", though that went down {earlier_s:.2f} s earlier" if earlier_s > 0 else ""
-    corrected = "undo (U) corrects it until its set is over, then a note (N) says it"
+    corrected = "undo corrects it until its set is over, then a note says it"
     return f"“{said}” was entered at the console and taken before “{own}” came{though}: {corrected}."
 
 

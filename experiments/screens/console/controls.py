@@ -13,7 +13,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import EventVerdict, LiveRun
 from experiments.screens.console import keys
 from experiments.screens.console.participant_link import NOT_LOST, ParticipantSide
-from experiments.screens.console.typed_lines import LINE_QUESTIONS, OF_THE_RUN, line_as_note, line_event, line_question
+from experiments.screens.console.typed_lines import BUT_REASON, LINE_QUESTIONS, line_as_note, line_event, line_question
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import FLAG_RULE, kept_text, typed_line, typed_rating
 from experiments.session import events
@@ -114,8 +114,8 @@ class Controls:
             self.uncover()
         if position.number != self.drawn.number or position.base is State.HALTED:
             self._keep_typed()
-        if position.base is State.HALTED:
-            self._set_aside(OF_THE_RUN)
+        if position.base is State.HALTED and self.drawn.base is not State.HALTED:
+            self._set_aside(BUT_REASON)
         self.drawn = position
 
     # keys and buttons
@@ -186,7 +186,7 @@ class Controls:
         match name:
             case "emergency":
                 self._offer(events.EmergencyStop())
-                self._set_aside(OF_THE_RUN)
+                self._set_aside(BUT_REASON)
             case _ if self.page and name not in _PAGE_COMMANDS + _HOLDS:
                 self._run_again()
             case "help" | "list":

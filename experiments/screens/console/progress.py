@@ -185,12 +185,12 @@ def gun_text(seen: Seen) -> tuple[str, str]:
         return phrase("Gun: not looked at any more"), "wait"
     if seen.gun_silent_s:
         return phrase("Gun: no answer for {silent_s:.0f} s", silent_s=seen.gun_silent_s), "wait"
-    blanks = seen.about.setup.config.trial.has_blanks  # nothing here gives one away: neither a count nor what is armed
-    beside = [] if blanks else [texts.shots_text(status.shots)]
-    beside.append(phrase("coil {coil_temperature_C:.0f} °C", coil_temperature_C=status.coil_temperature_C))
+    blanks = seen.about.setup.config.trial.has_blanks  # nothing here gives one away: no count, no coil that gets warm
+    coil = phrase("coil {coil_temperature_C:.0f} °C", coil_temperature_C=status.coil_temperature_C)
+    beside = [] if blanks else [texts.shots_text(status.shots), coil]
     mood = {"armed": "act", "resetting": "wait", "disarmed": "good", "fault": "bad"}[status.state]
     state, mood = (phrase("one moment"), "wait") if blanks and _may_have_fired(seen, said) else (status.state, mood)
-    return phrase("Gun: {state}\n{beside}", state=state, beside=" · ".join(beside)), mood
+    return "\n".join(filter(None, (phrase("Gun: {state}", state=state), " · ".join(beside)))), mood
 
 
 def _may_have_fired(seen: Seen, said: GunSeen) -> bool:

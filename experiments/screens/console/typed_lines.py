@@ -21,8 +21,8 @@ LINE_QUESTIONS: dict[keys.Name, str] = {
     "reason": phrase("Why was there an emergency stop?"),
     "stop": phrase("Why does the run stop here? It can be resumed."),
 }
-OF_THE_RUN: tuple[keys.Name, ...] = ("end break", "repeat", "stop")
-"""Lines for what is not done any more after an emergency stop; a note, a flag and the reason still are."""
+BUT_REASON: tuple[keys.Name, ...] = tuple(name for name in LINE_QUESTIONS if name != "reason")
+"""The lines that an emergency stop takes away."""
 
 
 def line_question(name: keys.Name, trial: Trial, live: LiveRun, *, kept: bool) -> str:
@@ -58,4 +58,5 @@ def line_event(name: keys.Name, trial: Trial, text: str) -> Event | None:
 
 def line_as_note(name: keys.Name, trial: Trial, text: str) -> events.Note:
     """What was typed for something that is not done any more."""
-    return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)
+    kind = {"note": "", "end break": "break: "}.get(name, f"{name}: ")
+    return events.Note(text=f"{kind}{text}", trial=trial)
