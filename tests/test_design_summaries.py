@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from analysis.logs.exclusions import IN_NO_TEST, LeftOut
 from analysis.report.figures import style
 from analysis.stats.anova import rm_anova, rm_tukey_hsd
 from analysis.stats.diagnostics import sphericity
@@ -22,6 +23,7 @@ from analysis.summary.question_results import DesignTest
 from analysis.summary.results import StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.designs import lacking_conditions, result_sentences, sections_of_designs
+from analysis.summary.sections.exclusion_words import people_left_out
 from experiments.config.door import checked_table
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.designs import design
@@ -159,10 +161,18 @@ def test_whoever_lacks_a_condition_is_named_and_in_no_test():
     config, laws = loaded("preference")
     table = simulated(config, laws, 6)
     table.loc[0, "rating"] = np.nan
-    found = summarise(config, table).questions["rating"]
+    summary = summarise(config, table)
+    found = summary.questions["rating"]
     assert found.left_out == (table.loc[0, "participant_id"],)
     assert found.tests[0].df == (2, 8)
     assert sum(cell.trials for cell in found.cells) == 17
+    told = next(result_sentences("preference", summary))
+    assert "(6 participants, 5 in its tests): " in told
+    assert [told.count(f", n = {people}") for people in (5, 6)] == [1, 2]
+    gone = LeftOut(experiment="preference", participant="P00", reason="no answer", rule=IN_NO_TEST)
+    report = ReportData(title="", statistics=StudyStatistics(excluded=(gone,)))
+    assert people_left_out(report, "preference", frozenset({"P00", "P01"})).endswith("was left out of its tests.")
+    assert people_left_out(report, "direction", frozenset({"P01"})) == "Nobody was left out."
 
 
 def test_whoever_answered_a_question_never_is_named_as_well():

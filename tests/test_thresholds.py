@@ -23,6 +23,7 @@ from analysis.summary.announced import names_of_tests, sentences_of_tests
 from analysis.summary.designs import summarise
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.tracks import figure_tracks
+from analysis.summary.results import DesignSummary
 from analysis.summary.sections.designs import result_sentences
 from analysis.summary.sections.thresholds import threshold_sections, threshold_sentences
 from analysis.summary.thresholds import MOST_FITTED, Thresholds, priors_of, thresholds
@@ -443,16 +444,32 @@ def test_few_levels_have_each_a_tick_below_their_functions(monkeypatch: pytest.M
         assert figure_files.touching(shown[0]) == []
 
 
-def test_an_interval_that_reaches_below_what_any_level_can_be_is_told() -> None:
-    config = load_setup("threshold").config
+def of_tracks(*right_of_10: tuple[float, int]) -> DesignSummary:
+    """Two people's right answers at the levels that a procedure chose, ten times each."""
     rows = [
         {"participant_id": who, "method": "asymmetric-1", "track": 1, "voltage_V": level, "direction": "forward"}
         | {"response": "forward" if place % 10 < right else "backward", "correct": int(place % 10 < right)}
         for who in ("A", "B")
-        for level, right in ((4.0, 8), (6.0, 9))  # near the threshold at the lowest level already
+        for level, right in right_of_10
         for place in range(10)
     ]
-    summary = summarise(config, pd.DataFrame(rows))
+    return summarise(load_setup("threshold").config, pd.DataFrame(rows))
+
+
+def test_a_threshold_beyond_every_level_that_was_presented_says_so() -> None:
+    """Though it lies among those that the procedure could have chosen."""
+    summary = of_tracks((9.0, 9), (10.0, 10), (11.0, 10))
+    found = summary.questions["response"].thresholds
+    assert found is not None
+    fits = [one.fit for one in found.conditions[0].people if one.fit is not None]
+    assert [(fit.where, fit.threshold.median < 9.0) for fit in fits] == [("within", True)] * 2
+    (section,) = threshold_sections("made", summary)
+    assert any(one.startswith("2 of 2 thresholds lie beyond every level that was ") for one in section.paragraphs)
+    assert {row[-1] for row in section.tables[-1].rows} == {"below every level presented, 9"}
+
+
+def test_an_interval_that_reaches_below_what_any_level_can_be_is_told() -> None:
+    summary = of_tracks((4.0, 8), (6.0, 9))  # near the threshold at the lowest level already
     found = summary.questions["response"].thresholds
     assert found is not None
     assert [one.fit.threshold.low < 0 for one in found.conditions[0].people if one.fit is not None] == [True, True]

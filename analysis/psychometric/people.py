@@ -47,6 +47,16 @@ class PersonFit:
         """How many trials had a stimulus."""
         return sum(point.trials for point in self.points)
 
+    @property
+    def beyond(self) -> str:
+        """What there is to say of a threshold that lies beyond every level that was presented; else empty."""
+        levels = [point.level for point in self.points]
+        if self.fit is None or self.fit.where != "within" or not levels:
+            return ""
+        if self.fit.threshold.median < min(levels):
+            return f"below every level presented, {min(levels):g}"
+        return f"above every level presented, {max(levels):g}" if self.fit.threshold.median > max(levels) else ""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GroupFit(Result):

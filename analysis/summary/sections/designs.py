@@ -78,8 +78,9 @@ def _standing(question: QuestionSummary, test: DesignTest) -> str:
 
 def result_sentences(name: str, found: DesignSummary, *, exact: bool = False) -> Iterator[str]:
     """What a design gave, a paragraph a question; `exact`: with p-values in full."""
-    people = how_many(found.n, "synthetic participant" if found.origin.synthetic else "participant")
+    everybody = how_many(found.n, "synthetic participant" if found.origin.synthetic else "participant")
     for asked, question in found.questions.items():
+        people = everybody + (f", {found.n - len(question.left_out):,} in its tests" if question.left_out else "")
         if question.cells:
             tests = [*_tests_words(found, question, exact=exact)]
             few = [TWO_PEOPLE] if found.n == 2 and tests else []
@@ -131,7 +132,8 @@ def _mean_and_spread(question: QuestionSummary, cell: ConditionSummary) -> str:
         return f"{_mean(question, cell)} ({cell.right:,} of {cell.trials:,})"
     if question.kind != "rating":
         return _mean(question, cell)
-    return f"M = {_mean(question, cell)}{'' if cell.people < 2 else f', SD = {apa.number(cell.sd)}'}"
+    count = f", n = {cell.people:,}" if question.left_out else ""
+    return f"M = {_mean(question, cell)}{'' if cell.people < 2 else f', SD = {apa.number(cell.sd)}'}{count}"
 
 
 def _tests_words(found: DesignSummary, question: QuestionSummary, *, exact: bool) -> Iterator[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from analysis.logs.design_logs import ONE_DESIGN
 from analysis.logs.exclusion_rules import BY_HAND
-from analysis.logs.exclusions import FINISHED, NOT_COUNTED, LeftOut
+from analysis.logs.exclusions import FINISHED, IN_NO_TEST, NOT_COUNTED, LeftOut
 from analysis.logs.kinds import IN_REGISTER, NEVER_TOGETHER
 from analysis.report import apa
 from analysis.report.labels import named
@@ -46,6 +46,8 @@ def people_left_out(report: ReportData, experiment: str, analysed: frozenset[str
     left = Counter(_reason(report, one) for one in gone.values() if one.rule != FINISHED)
     parts = [_left_out(left)] if left else []
     parts += [f"{how_many(begun, 'participant')} had begun and not finished."] if begun else []
+    if any(one.rule == IN_NO_TEST for one in _entries(report, experiment)):
+        return " ".join([*parts, "Whoever lacked an answer to a question in some condition was left out of its tests."])
     return " ".join(parts) or "Nobody was left out."
 
 

@@ -163,6 +163,12 @@ def _without(of: Thresholds) -> Iterator[str]:
             f"{lacking} of {len(people)} fits found no threshold within the levels: their numbers rest on the prior, "
             "are no measurement, and count in the group by how little they say. The table tells which."
         )
+    if beyond := sum(bool(one.beyond) for one in people):
+        lie = "threshold lies" if beyond == 1 else "thresholds lie"
+        yield (
+            f"{beyond} of {len(people)} {lie} beyond every level that was presented: drawn on from there, as the "
+            "priors have it. The table tells which."
+        )
     if unfitted:
         yield f"{unfitted} of {len(people)} had too few answers for a fit: below {FEWEST_ANSWERS}, or at one level."
 
@@ -256,7 +262,8 @@ def threshold_words(found: DesignSummary, of: Thresholds) -> Iterator[str]:
         if one.group is not None:
             yield f"{_condition(found, one.levels)}{_group_words(of, one)}"
         elif one.people and (fit := one.people[0].fit) is not None:
-            shown = one.people[0].reason or _number(fit.threshold.median, _digits(of))
+            beyond = f" ({one.people[0].beyond})" if one.people[0].beyond else ""
+            shown = one.people[0].reason or f"{_number(fit.threshold.median, _digits(of))}{beyond}"
             yield f"{_condition(found, one.levels)}{shown}"
 
 
@@ -359,7 +366,7 @@ def _own(one: PersonFit, digits: int | None, *, guessed: bool) -> tuple[str, ...
         apa.below_one(fit.lapse.median),
         *((apa.below_one(fit.guess.median),) if guessed else ()),
         apa.p_cell(fit.goodness.p),
-        one.reason or "",
+        one.reason or one.beyond,
     )
 
 
