@@ -29,7 +29,6 @@ from experiments.earlier_run import (
     words_shown,
 )
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.rebuild import table
 from experiments.record import replay
 from experiments.record.journal import (
     Contents,
@@ -39,6 +38,7 @@ from experiments.record.journal import (
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
+from experiments.record.rebuild import table
 from experiments.record.replay import RunPosition
 from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from experiments.live_run import RunStopped
-from experiments.rebuild import began_with, shots_table, table
 from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import Contents
+from experiments.record.rebuild import began_with, shots_table, table
 from experiments.session.steps import Answered
 from experiments.study.folders import Place, PlaceError
 

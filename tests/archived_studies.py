@@ -10,8 +10,8 @@ from analysis.archive import manifest
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.setup import sha256
 from experiments.load import load_setup
-from experiments.rebuild import rebuild
 from experiments.record.journal import link_of, record_line
+from experiments.record.rebuild import rebuild
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen

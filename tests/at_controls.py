@@ -25,9 +25,9 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan, Trial
 from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
-from experiments.rebuild import table
 from experiments.record import storage
 from experiments.record.journal import Contents, read_journal
+from experiments.record.rebuild import table
 from experiments.record.replay import history
 from experiments.run import Finished, run
 from experiments.run_request import RunRequest

@@ -31,8 +31,8 @@ from experiments.config.door import Model, StudyConfig, load
 from experiments.config.setup import GunConfig, sha256
 from experiments.config.toml_text import toml_text
 from experiments.load import load_setup, shipped_folder
-from experiments.rebuild import table
 from experiments.record import journal
+from experiments.record.rebuild import table
 from experiments.study import register
 from experiments.synthetic.laws import SyntheticAnswers
 from tests.journals import forged, raw

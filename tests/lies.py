@@ -26,7 +26,7 @@ from device.messages import RecoilError
 from experiments.clock import VirtualClock
 from experiments.config.door import load
 from experiments.load import load_setup
-from experiments.rebuild import rebuild_table
+from experiments.record.rebuild import rebuild_table
 from experiments.record.tables import FILE_SUFFIX
 from experiments.run import run
 from experiments.run_request import RunRequest

@@ -16,9 +16,9 @@ from experiments.design.planning import plan_of
 from experiments.design.stimuli import stimuli_of
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
-from experiments.rebuild import table
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
+from experiments.record.rebuild import table
 from experiments.record.replay import RunPosition
 from experiments.run import run
 from experiments.run_request import RunRequest

@@ -12,9 +12,9 @@ import pytest
 from analysis.logs.reading import read_logs
 from experiments.clock import VirtualClock
 from experiments.design.planning import plan_of
-from experiments.rebuild import table
 from experiments.record.design_table import design_rows
 from experiments.record.journal import Contents, Record, read_journal
+from experiments.record.rebuild import table
 from experiments.record.replay import history as told_by
 from experiments.run import run
 from experiments.run_request import RunRequest

@@ -14,8 +14,8 @@ from experiments.clock import VirtualClock
 from experiments.config.door import ConfigError
 from experiments.config.setup import canonical_json, sha256
 from experiments.load import load_setup, shipped_folder
-from experiments.rebuild import rebuild
 from experiments.record.journal import JournalError, read_journal
+from experiments.record.rebuild import rebuild
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen

@@ -36,9 +36,9 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.earlier_run import UNMEASURED
 from experiments.load import load_setup
-from experiments.rebuild import shots_table, table
 from experiments.record import storage
 from experiments.record.journal import Contents, ending_of, read_journal
+from experiments.record.rebuild import shots_table, table
 from experiments.record.replay import history
 from experiments.run import Finished, run
 from experiments.run_request import RunRequest

@@ -12,9 +12,9 @@ from experiments.clock import VirtualClock
 from experiments.design.planned import order_shown
 from experiments.design.planning import groups, plan_of, practice_of, square_size
 from experiments.load import load_setup
-from experiments.rebuild import rebuild
 from experiments.record.design_columns import columns
 from experiments.record.journal import read_journal
+from experiments.record.rebuild import rebuild
 from experiments.record.replay import history
 from experiments.run import run
 from experiments.run_request import RunRequest

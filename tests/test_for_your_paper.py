@@ -25,7 +25,7 @@ from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.rebuild import rebuild
+from experiments.record.rebuild import rebuild
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen

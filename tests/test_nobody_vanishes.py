@@ -20,7 +20,7 @@ from analysis.summary.participation import PersonInExperiment, exclusion_lines
 from analysis.summary.summary import summarize
 from experiments.clock import VirtualClock
 from experiments.load import load_setup
-from experiments.rebuild import rebuild_table
+from experiments.record.rebuild import rebuild_table
 from experiments.record.tables import DataKind
 from experiments.run import run
 from experiments.run_request import RunRequest

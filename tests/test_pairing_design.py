@@ -22,8 +22,8 @@ from experiments.design.limits import check_limits
 from experiments.design.planning import plan_of
 from experiments.design.stimuli import settings
 from experiments.load import load_gun, load_setup, shipped_folder
-from experiments.rebuild import rebuild
 from experiments.record.journal import read_journal
+from experiments.record.rebuild import rebuild
 from experiments.record.replay import history
 from experiments.screens import texts
 from experiments.session.steps import FireShot

@@ -27,8 +27,8 @@ from analysis.summary.sections.preregistration import deviations_sections
 from experiments.clock import RealClock, VirtualClock
 from experiments.config.door import ConfigError
 from experiments.load import load_setup
-from experiments.rebuild import rebuild
 from experiments.record.journal import head
+from experiments.record.rebuild import rebuild
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.console.people import changed_text

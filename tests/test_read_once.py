@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 
 from device import open_gun
-from experiments import rebuild
 from experiments.clock import VirtualClock
 from experiments.earlier_run import UnfinishedRun
 from experiments.load import load_setup
-from experiments.record import storage
+from experiments.record import rebuild, storage
 from experiments.record.journal import Journal, JournalError, read_journal
 from experiments.run import run
 from experiments.run_request import RunRequest

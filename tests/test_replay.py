@@ -18,8 +18,8 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
 from experiments.earlier_run import NotAsItBegan, earlier_run, way_back_to_gun
-from experiments.rebuild import rebuild
 from experiments.record.journal import Journal, JournalError, read_journal, record_line
+from experiments.record.rebuild import rebuild
 from experiments.record.replay import go_on, history, replay
 from experiments.run import run
 from experiments.run_request import Again, ParticipantOptions, RunRequest

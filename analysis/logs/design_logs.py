@@ -20,11 +20,11 @@ from experiments.config.door import ConfigError, checked_table
 from experiments.config.setup import sha256
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
-from experiments.rebuild import began_with
 from experiments.record import journal
 from experiments.record.design_columns import columns
 from experiments.record.design_table import went_back
 from experiments.record.journal import Head, JournalError
+from experiments.record.rebuild import began_with
 from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
 from experiments.study.changes import FileValues, changed_keys, plain_value
 from experiments.study.preregistration import read_chain

@@ -22,9 +22,9 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planned import order_shown
 from experiments.load import load_setup, load_study, shipped_folder
-from experiments.rebuild import began_with
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
+from experiments.record.rebuild import began_with
 from experiments.session.history import answered
 from experiments.session.practice_rounds import is_to_be_repeated
 from experiments.study import register

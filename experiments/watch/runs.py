@@ -12,9 +12,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
-from experiments.rebuild import JOURNAL_NAME, began_with, misnamed
 from experiments.record import replay, storage
 from experiments.record.journal import Contents, Head, JournalError, Record, read_as
+from experiments.record.rebuild import JOURNAL_NAME, began_with, misnamed
 from experiments.record.tables import DataKind
 from experiments.record.tail import JournalTail
 from experiments.screens import texts

@@ -208,7 +208,7 @@ def rebuild(
     journals: Annotated[list[Path], typer.Argument(metavar="JOURNAL...")], as_json: AsJsonOption = False
 ) -> None:
     """Make the CSV again from its journal, byte for byte."""
-    from experiments.rebuild import rebuild_table
+    from experiments.record.rebuild import rebuild_table
 
     built, refused = each_of(journals, rebuild_table)
     for message in (message for one in built for message in one.messages):

@@ -19,10 +19,10 @@ from experiments.config.door import ConfigError, StudyConfig
 from experiments.config.setup import Setup, sha256
 from experiments.design.config import DesignConfig
 from experiments.load import load_setup, load_study
-from experiments.rebuild import rebuild
 from experiments.record import storage
 from experiments.record.journal import begun
 from experiments.record.provenance import git_commit, recoil_version
+from experiments.record.rebuild import rebuild
 from experiments.run import run
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
