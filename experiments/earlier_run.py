@@ -28,14 +28,13 @@ from experiments.record.journal import (
     read_journal,
 )
 from experiments.record.journal import head as journal_head
-from experiments.record.replay import history, is_shot, last_word_on_gun
+from experiments.record.replay import answers_in, history, is_shot, last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
 from experiments.session.steps import Answered
 from experiments.study import folders, register
 from experiments.study.changes import changes_told, people_changes, setup_changes
 from experiments.study.folders import RETEST, Place, PlaceError
-from experiments.written_tables import answers_in
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -29,7 +29,8 @@ from experiments.earlier_run import (
     words_shown,
 )
 from experiments.live_run import LiveRun, RunStopped, Screen
-from experiments.record import replay
+from experiments.record import replay, storage
+from experiments.record.dictionary import design_dictionary
 from experiments.record.journal import (
     Contents,
     Head,
@@ -38,7 +39,7 @@ from experiments.record.journal import (
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.provenance import provenance
-from experiments.record.rebuild import table
+from experiments.record.rebuild import began_with, shots_table, table
 from experiments.record.replay import RunPosition
 from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out
@@ -49,7 +50,6 @@ from experiments.session.steps import Session, step_record
 from experiments.study import balance, folders, preregistration, register
 from experiments.study.folders import Place, PlaceError
 from experiments.study.register import Register
-from experiments.written_tables import tables_of_finished, tables_of_stopped
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -320,7 +320,7 @@ def _to_the_end(
         desk.live.end(why)
         desk.live.write_stop(why)
         halted = desk.live.halted
-        saved = tables_of_stopped(place, desk.live.journal.read_back(), why, halted=halted)
+        saved = _tables_of_stopped(place, desk.live.journal.read_back(), why, halted=halted)
         if isinstance(stop, RunStopped):
             stop.saved, stop.halted = saved, halted
         raise
@@ -331,4 +331,41 @@ def _to_the_end(
     contents = desk.live.journal.read_back()
     hashes = {"table_sha256": hashlib.sha256(table(contents)).hexdigest(), "journal_sha256": contents.sha256}
     desk.live.journal.append("finished", **hashes)
-    return tables_of_finished(place, contents)
+    return _tables_of_finished(place, contents)
+
+
+def _write_tables(place: Place, contents: Contents) -> int:
+    """Write the tables that a journal makes, and their dictionary; the answers in it. `OSError`: they cannot be."""
+    storage.write_whole(place.table, table(contents))
+    design = began_with(contents.head)
+    measured = shots_table(contents)
+    if measured is not None:
+        storage.write_whole(place.shots, measured)
+    storage.write_whole(place.results / f"task-{design.design}_columns.md", design_dictionary(design).encode())
+    return replay.answers_in(contents)
+
+
+def _tables_of_finished(place: Place, contents: Contents) -> int:
+    """As `_write_tables`, of a run that is finished. `PlaceError`: they cannot be written, by which nothing is lost."""
+    try:
+        return _write_tables(place, contents)
+    except OSError as error:
+        raise PlaceError(f"the run is finished, and {_unwritten(place, error)}") from error
+
+
+def _tables_of_stopped(place: Place, contents: Contents, why: str, *, halted: bool) -> int:
+    """As `_write_tables`, of a run that was stopped. `RunStopped`: they cannot be written, by which nothing is lost."""
+    try:
+        return _write_tables(place, contents)
+    except OSError as error:
+        stop = RunStopped(f"{why}; {_unwritten(place, error)}")
+        stop.saved, stop.halted = replay.answers_in(contents), halted
+        raise stop from error
+
+
+def _unwritten(place: Place, error: OSError) -> str:
+    mend = "free some space" if error.errno in storage.DISK_FULL else "see to that"
+    return (
+        f"every answer is in the journal, but its table could not be written ({error.filename or place.table}: "
+        f"{error.strerror}): {mend}, and `recoil rebuild {place.journal}` writes it"
+    )

@@ -61,6 +61,11 @@ def history(contents: Contents) -> History:
     return found
 
 
+def answers_in(contents: Contents) -> int:
+    """How many answers a journal holds."""
+    return sum(isinstance(word, steps.Answered) for _, word in history(contents))
+
+
 _REMARKS = ("remark", "measured")
 """Records that belong to no step: what was said, and what a sensor measured."""
 
