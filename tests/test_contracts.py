@@ -52,6 +52,7 @@ def test_every_contract_is_kept(copy: Path) -> None:
         ("experiments/record/storage.py", "import experiments.record.journal", "No circle"),
         ("analysis/stats/binomial.py", "import time", "Pure rooms touch neither files nor clock, line nor process"),
         ("device/physics/shot.py", "import os", "Pure rooms touch neither files nor clock, line nor process"),
+        ("experiments/watch/lsl.py", "import experiments.screens.participant.link", "Who watches runs opens no screen"),
         ("experiments/screens/terminal.py", "from PyQt6.QtCore import QTimer", "Qt is the console's alone"),
         ("recoil/cli.py", "import psychopy", "PsychoPy is the participant's alone"),
         ("experiments/runner.py", "import serial", "The line is the serial gun's alone"),

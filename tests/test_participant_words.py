@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from experiments.clock import ClockMap, RoundTrip, clock_map
 from experiments.screens.participant.app import Wire
-from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
 from experiments.screens.participant.messages import (
     AskChoice,
     AskDescription,

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from device.machine_clock import machine_s
 from device.messages import RecoilError, error_line, said_by
-from experiments.screens.participant.link import ClockMap, RoundTrip, clock_map
+from experiments.clock import ClockMap, RoundTrip, clock_map
 from experiments.watch.feed import MarkerFeed
 from experiments.watch.markers import DETAIL_COLUMNS, Marker
 from experiments.watch.server import NICE
