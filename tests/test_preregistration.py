@@ -428,17 +428,17 @@ def test_who_left_is_named_with_the_reason_and_a_code_that_was_nobodys_took_no_p
     freeze(study, "", clock)
     do(study, "P01")
     old = Facts(age_years=40, sex="female", handedness="right")
-    for code, reason in {"P01": "moved away", "X99": "mistyped for P01"}.items():
+    for code, reason in {"P01": "moved away", "X99": "mistyped; is P01"}.items():
         register.append(results, register.entry("joined", code, facts=old), clock)
         register.append(results, register.entry("left", code, reason=reason), clock)
     of_people = [(one.what, one.who) for one in of_kind(told(study), "participants")[2:]]
     assert of_people == [
         ("comes no more: moved away", ("P01",)),
         ("took part, not eligible: age_years = 40: must be at most 29", ("P01",)),
-        ("comes no more: mistyped for P01", ("X99",)),
+        ("comes no more: mistyped; is P01", ("X99",)),
     ]
     absent = participation(read_logs([results]), {"preference": ["P01"]}, ()).absent
-    assert [(one.participant, one.state) for one in absent] == [("X99", "not done: comes no more (mistyped for P01)")]
+    assert [(one.participant, one.state) for one in absent] == [("X99", "not done: comes no more (mistyped; is P01)")]
 
 
 @pytest.mark.slow

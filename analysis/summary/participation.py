@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut, by_rule
 from analysis.logs.kinds import NEVER_TOGETHER
 from analysis.logs.reading import Logs
 from device.messages import first_few, how_many
-from experiments.study.study import by_code
+from experiments.study.study import Member, by_code
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,54 +48,70 @@ class Participation:
     absent: tuple[PersonInExperiment, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class _Absence:
+    """How somebody stands in an experiment whose analysis they are not in, and what there is to say of it."""
+
+    state: Literal["left out", "begun", "not done", "excluded by hand, and not done"]
+    why: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.state}: {self.why}" if self.why else self.state
+
+
 def participation(logs: Logs, analysed: Mapping[str, Iterable[str]], excluded: Sequence[LeftOut]) -> Participation:
     """Look at everybody. `analysed`: by experiment, who is in its tests; `excluded`: who is not, and why."""
     within = {name: set(people) for name, people in analysed.items()}
-    told = [one for one in reversed(excluded) if one.participant and one.experiment and one.rule != NEVER_TOGETHER]
-    why = {(one.participant, one.experiment): one for one in told}
-    begun = {(logs.person(run.file.study, run.file.participant), run.file.experiment): run for run in logs.begun}
-    runs = [(logs.person(run.study, run.participant), run) for run in logs.runs]
+    known = _of_logs(logs, excluded)
     joined = {logs.person(study, one.participant_id): one for study, one in logs.joined}
-    people = set().union(*within.values(), (who for who, _ in why), (who for who, _ in begun))
+    people = {who for who, _ in known}.union(*within.values())
     nobody = {one.participant for one in excluded if one.rule == NEVER_TOGETHER} - people  # of another kind of data
-    runs = [(who, run) for who, run in runs if who not in nobody]
+    every = ((logs.person(run.study, run.participant), run) for run in logs.runs)
+    runs = [(who, run) for who, run in every if who not in nobody]
     people |= (joined.keys() - nobody) | {who for who, _ in runs}
-    done = [*why, *begun, *((who, run.experiment) for who, run in runs)]
-    done += [(who, name) for name, some in within.items() for who in some]
-    names = list(dict.fromkeys([*within, *(name for _, name in why), *(run.experiment for _, run in runs)]))
+    done = [(who, name) for name, some in within.items() for who in some]
+    done += [*known, *((who, run.experiment) for who, run in runs)]
+    names = list(dict.fromkeys([*within, *(name for _, name in done)]))
     there = {(_study_of(who), name) for who, name in done}
-
-    def state(who: str, experiment: str) -> str:
-        gone = f"; comes no more ({joined[who].left})" if who in joined and joined[who].left is not None else ""
-        if who in within.get(experiment, ()):
-            return ""
-        if (who, experiment) in begun:
-            return f"begun: {begun[who, experiment].far}{gone}"
-        if (who, experiment) in why:
-            one = why[who, experiment]
-            return f"{'begun' if one.rule == FINISHED else 'left out'}: {one.reason}{gone}"
-        if (_study_of(who), experiment) not in there:
-            return ""
-        out = who in joined and joined[who].excluded is not None
-        return _EXCLUDED if out else f"not done{gone.replace(';', ':')}"
-
-    order = sorted(people, key=by_code)
-    absent = tuple(
-        PersonInExperiment(participant=who, experiment=name, state=said)
-        for who in order
+    absences = {
+        (who, name): _with_register(known.get((who, name), _Absence("not done")), joined.get(who))
+        for who in sorted(people, key=by_code)
         for name in names
-        if (said := state(who, name))
-    )
+        if who not in within.get(name, ()) and (_study_of(who), name) in there
+    }
     kinds = Counter[tuple[str, str]]((run.experiment, run.kind) for _, run in runs if run.data in (None, logs.kind))
-    counts = Counter((one.experiment, one.state.partition(":")[0]) for one in absent)
+    counts = Counter[tuple[str, str]]((name, one.state) for (_, name), one in absences.items())
     return Participation(
         experiments={name: _counted(name, len(within.get(name, ())), counts, kinds) for name in names},
-        absent=absent,
+        absent=tuple(
+            PersonInExperiment(participant=who, experiment=name, state=str(one))
+            for (who, name), one in absences.items()
+        ),
     )
 
 
-_EXCLUDED = "excluded by hand, and not done"
-"""Of whom nothing is waited for."""
+def _of_logs(logs: Logs, excluded: Sequence[LeftOut]) -> dict[tuple[str, str], _Absence]:
+    """Who is left out of which experiment, for the first of the reasons, and who has begun it."""
+    left_out = {
+        (one.participant, one.experiment): _Absence("begun" if one.rule == FINISHED else "left out", one.reason)
+        for one in reversed(excluded)
+        if one.participant and one.experiment and one.rule != NEVER_TOGETHER
+    }
+    return left_out | {
+        (logs.person(run.file.study, run.file.participant), run.file.experiment): _Absence("begun", run.far)
+        for run in logs.begun
+    }
+
+
+def _with_register(one: _Absence, member: Member | None) -> _Absence:
+    """An absence with what the register says: of whom is excluded by hand nothing is waited for."""
+    if member is None:
+        return one
+    if one.state == "not done" and member.excluded is not None:
+        return _Absence("excluded by hand, and not done")
+    if member.left is None:
+        return one
+    return replace(one, why="; ".join(filter(None, (one.why, f"comes no more ({member.left})"))))
 
 
 def _counted(
