@@ -24,11 +24,11 @@ from experiments.live_run import RunStopped, Screen
 from experiments.load import language_key
 from experiments.run import Finished, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
-from experiments.screens.console.people import doubt_text
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
+from experiments.screens.texts import doubt_text
 from experiments.study.balance import journals, unread
-from experiments.study.enrolment import code_prefix_of, not_on_record
+from experiments.study.enrolment import code_doubt, code_prefix_of, not_on_record
 from experiments.study.folders import Place, PlaceError, check_code, known_codes, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
@@ -126,8 +126,9 @@ def _not_on_record(request: RunRequest) -> Iterator[str]:
     """The start window asks by itself, and nobody is asked about synthetic people."""
     code, results = request.participant_id, request.results
     if code and not request.simulated:
-        if doubt := doubt_text(code, known_codes(results, read_register(results)), code_prefix_of(results)):
-            yield f"participant {doubt} The run goes on all the same; if the code is wrong, stop and use the right one"
+        if doubt := code_doubt(code, known_codes(results, read_register(results)), code_prefix_of(results)):
+            go_on = "The run goes on all the same; if the code is wrong, stop and use the right one"
+            yield f"participant {doubt_text(doubt)} {go_on}"
         yield from filter(None, [not_on_record(results, code)])
 
 

@@ -12,7 +12,7 @@ from analysis.report.section import Section, Table
 from analysis.report.terminal import with_tables
 from device.messages import how_many
 from experiments.clock import RealClock, date_text
-from experiments.screens.console.people import doubt_text
+from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, known_codes, open_study, overview
 from experiments.study.register import read_register
@@ -84,9 +84,9 @@ def _carry_out(where: StudyFolder, change: StudyChange) -> tuple[str, ...]:
     if change.action == "join":
         known = known_codes(where.results, read_register(where.results))
         reasons = enrolment.join(where, code, change.facts, clock)
-        doubt = doubt_text(code, known, where.config.code_prefix)
+        doubt = enrolment.code_doubt(code, known, where.config.code_prefix)
         return (
-            *([f"{doubt} It is recorded; --left {code} says that it was nobody's"] if doubt else []),
+            *([f"{doubt_text(doubt)} It is recorded; --left {code} says that it was nobody's"] if doubt else []),
             *(f"participant {code} is not eligible: {reason}; recorded, exclude?" for reason in reasons),
         )
     _REASONED[change.action](where.results, code, change.reason, clock)

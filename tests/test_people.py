@@ -9,7 +9,9 @@ from zoneinfo import ZoneInfo
 import pytest
 
 from experiments.clock import date_text, time_text
-from experiments.screens.console.people import cell_text, coming_text, doubt_text, note_text, remark, stopped_text
+from experiments.screens.console.people import cell_text, coming_text, note_text, remark, stopped_text
+from experiments.screens.texts import doubt_text
+from experiments.study.enrolment import code_doubt
 from experiments.study.folders import Overview
 from experiments.study.preregistration import Chain, FreezeStatus
 from experiments.study.study import NextParticipant, Participant, RunProgress, RunState
@@ -118,14 +120,17 @@ def test_of_a_new_code_it_is_said_that_it_is_new_and_of_none_what_to_do() -> Non
 
 @pytest.mark.parametrize(("code", "known"), [("P1", "P01"), ("p01", "P01"), ("P001", "P01")])
 def test_a_new_code_that_looks_like_one_that_is_there_is_asked_about(code: str, known: str) -> None:
-    assert doubt_text(code, ["P10", known], "P") == f"{code} is new, and {known} is there: is it the same person?"
-    assert doubt_text("P100", ["P10", known], "P") == ""
+    doubt = code_doubt(code, ["P10", known], "P")
+    assert doubt is not None
+    assert doubt_text(doubt) == f"{code} is new, and {known} is there: is it the same person?"
+    assert code_doubt("P100", ["P10", known], "P") is None
 
 
 def test_a_new_code_without_the_prefix_of_the_study_is_asked_about() -> None:
-    said = "X99 is new, and the codes of this study begin with P: is it right?"
-    assert doubt_text("X99", ["P01"], "P") == said
-    assert [doubt_text(code, ["X99"], "P") for code in ("X99", "", "X 9", "P99")] == [""] * 4
+    doubt = code_doubt("X99", ["P01"], "P")
+    assert doubt is not None
+    assert doubt_text(doubt) == "X99 is new, and the codes of this study begin with P: is it right?"
+    assert [code_doubt(code, ["X99"], "P") for code in ("X99", "", "X 9", "P99")] == [None] * 4
 
 
 def test_an_exclusion_is_said_before_all_else() -> None:

@@ -17,6 +17,7 @@ from experiments.session import remarks, steps
 from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
+from experiments.study.enrolment import CodeDoubt
 from experiments.tasks.questions import AnswerValue, on_scale
 
 FLAG_RULE = phrase("A flag is a word of at most {max_flag} letters, digits and hyphens.", max_flag=MAX_FLAG)
@@ -319,6 +320,17 @@ def _with_thousands(text: str) -> float:
 def _number_kind(asked: Rate) -> str:
     """What a number that is asked for is called."""
     return phrase("rank") if asked.distinct else phrase("number") if asked.is_number else phrase("rating")
+
+
+def doubt_text(doubt: CodeDoubt) -> str:
+    """Why a new code may be mistyped."""
+    if doubt.other:
+        return phrase("{code} is new, and {other} is there: is it the same person?", code=doubt.code, other=doubt.other)
+    return phrase(
+        "{code} is new, and the codes of this study begin with {prefix}: is it right?",
+        code=doubt.code,
+        prefix=doubt.prefix,
+    )
 
 
 def typed_rating(text: str, scale: Rate) -> float | str:

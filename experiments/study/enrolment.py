@@ -17,7 +17,7 @@ from experiments.config.door import ConfigError, EligibilityConfig, Fact
 from experiments.load import load_study
 from experiments.record.journal import JournalError
 from experiments.study import folders, register
-from experiments.study.folders import RETEST, PlaceError, StudyFolder, look_at
+from experiments.study.folders import RETEST, PlaceError, StudyFolder, is_code, look_at
 from experiments.study.preregistration import STUDY_FILE
 from experiments.study.register import RegisterError
 from experiments.study.study import Facts, Member, Participant, RunProgress, eligible, unanswered, unasked
@@ -126,16 +126,34 @@ def enrolment_refusal(
     return ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CodeDoubt:
+    """A new code that may be mistyped: it looks like the known `other`, or else lacks the study's `prefix`."""
+
+    code: str
+    other: str = ""
+    prefix: str = ""
+
+
+def code_doubt(code: str, known: Sequence[str], prefix: str) -> CodeDoubt | None:
+    """Why a code may be mistyped, by those that are known and by the study's prefix."""
+    if other := _look_alike(code, known):
+        return CodeDoubt(code=code, other=other)
+    if is_code(code) and code not in known and not code.startswith(prefix):
+        return CodeDoubt(code=code, prefix=prefix)
+    return None
+
+
 _LEADING_ZEROS = re.compile(r"(?<![0-9])0+(?=[0-9])")
 _READ_ALIKE = str.maketrans("oil", "011")
 
 
-def look_alike(participant_id: str, known: Iterable[str]) -> str:
+def _look_alike(participant_id: str, known: Iterable[str]) -> str:
     """The known code from which a new one differs by case, leading zeros or letters read as digits alone; else empty.
 
-    >>> look_alike("P1", ["P01", "P10"]), look_alike("P10", ["P01", "P1"]), look_alike("P1", ["P1", "P01"])
+    >>> _look_alike("P1", ["P01", "P10"]), _look_alike("P10", ["P01", "P1"]), _look_alike("P1", ["P1", "P01"])
     ('P01', '', '')
-    >>> look_alike("PO1", ["P01"]), look_alike("Pl2", ["P12"])
+    >>> _look_alike("PO1", ["P01"]), _look_alike("Pl2", ["P12"])
     ('P01', 'P12')
     """
     known, plain = tuple(known), _plain(participant_id)

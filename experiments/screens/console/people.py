@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from experiments.clock import date_text
 from experiments.screens.phrases import phrase
-from experiments.study.enrolment import left_to_do, look_alike, passed_over, run_of
+from experiments.study.enrolment import left_to_do, passed_over, run_of
 from experiments.study.folders import Overview, is_code
 from experiments.study.study import Participant, RunProgress, taking_part
 
@@ -97,17 +97,6 @@ def named_text(named: str, code: str, person: Participant | None, experiment: st
         code=code,
         experiment=experiment,
     )
-
-
-def doubt_text(code: str, known: Sequence[str], prefix: str) -> str:
-    """Why a code may be mistyped, by those that are known and by the study's prefix; else empty."""
-    if other := look_alike(code, known):
-        return phrase("{code} is new, and {other} is there: is it the same person?", code=code, other=other)
-    if is_code(code) and code not in known and not code.startswith(prefix):
-        return phrase(
-            "{code} is new, and the codes of this study begin with {prefix}: is it right?", code=code, prefix=prefix
-        )
-    return ""
 
 
 def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:

@@ -22,6 +22,7 @@ from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.phrases import phrase
+from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
 from experiments.study.folders import Overview, PlaceError, StudyFolder, overview, read_anew
 from experiments.study.study import Participant, RunProgress
@@ -166,8 +167,8 @@ class StartWindow(QtWidgets.QWidget):
         code, experiment = self.form.participant_id, self.form.experiment.currentText()
         person = self._person(code)
         known = [one.participant_id for one in self._seen.participants]
-        doubt = people.doubt_text(code, known, self._study.config.code_prefix)
-        said = (doubt, "ask") if doubt else people.remark(code, person, experiment, self._study.experiments)
+        doubt = enrolment.code_doubt(code, known, self._study.config.code_prefix)
+        said = (doubt_text(doubt), "ask") if doubt else people.remark(code, person, experiment, self._study.experiments)
         self.form.remark.say(*said)
         out = person is not None and bool(person.gone)
         self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
