@@ -28,13 +28,14 @@ from experiments.record.journal import (
     read_journal,
 )
 from experiments.record.journal import head as journal_head
+from experiments.record.names import Place
 from experiments.record.replay import answers_in, history, is_shot, last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
 from experiments.session.steps import Answered
 from experiments.study import folders, register
 from experiments.study.changes import changes_told, people_changes, setup_changes
-from experiments.study.folders import RETEST, Place, PlaceError
+from experiments.study.folders import RETEST, PlaceError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -38,6 +38,7 @@ from experiments.record.journal import (
     JournalError,
 )
 from experiments.record.journal import head as journal_head
+from experiments.record.names import Place
 from experiments.record.provenance import provenance
 from experiments.record.rebuild import began_with, shots_table, table
 from experiments.record.replay import RunPosition
@@ -48,7 +49,7 @@ from experiments.session.history import GrowingHistory
 from experiments.session.remarks import HALTED_BEFORE, Noted
 from experiments.session.steps import Session, step_record
 from experiments.study import balance, folders, preregistration, register
-from experiments.study.folders import Place, PlaceError
+from experiments.study.folders import PlaceError
 from experiments.study.register import Register
 
 if TYPE_CHECKING:

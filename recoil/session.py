@@ -22,14 +22,15 @@ from experiments.design.shown_texts import letters_of
 from experiments.earlier_run import begun_language, check_resumable, language_begun_in, way_back_to_gun
 from experiments.live_run import RunStopped, Screen
 from experiments.load import language_key
+from experiments.record.names import Place, journals
 from experiments.run import Finished, run
 from experiments.run_request import Again, ParticipantOptions, RunRequest, ScreenName
 from experiments.screens.synthetic import synthetic_screen
 from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import doubt_text
-from experiments.study.balance import journals, unread
+from experiments.study.balance import unread
 from experiments.study.enrolment import code_doubt, code_prefix_of, not_on_record
-from experiments.study.folders import Place, PlaceError, check_code, known_codes, place
+from experiments.study.folders import PlaceError, check_code, known_codes, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
 

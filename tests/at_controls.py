@@ -27,6 +27,7 @@ from experiments.live_run import LiveRun, Screen
 from experiments.load import load_setup
 from experiments.record import storage
 from experiments.record.journal import Contents, read_journal
+from experiments.record.names import Place
 from experiments.record.rebuild import table
 from experiments.record.replay import history
 from experiments.run import Finished, run
@@ -41,7 +42,7 @@ from experiments.session.events import Press
 from experiments.session.remarks import EntryCorrected, Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Answered, FireShot, Outcome, Step
-from experiments.study.folders import Place, place
+from experiments.study.folders import place
 from experiments.tasks.questions import first_choices
 from tests.designs import direction_with
 from tests.waiting import PATIENCE_S, wait_for

@@ -19,11 +19,12 @@ from experiments.clock import RealClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import Contents, read_journal
+from experiments.record.names import Place
 from experiments.record.replay import history
 from experiments.run_request import RunRequest
 from experiments.screens.synthetic import synthetic_screen
 from experiments.session.steps import Answered, Failed, Fired
-from experiments.study.folders import Place, place
+from experiments.study.folders import place
 from tests.journals import raw
 from tests.twins import Troubles
 

@@ -18,6 +18,7 @@ from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.record import replay, storage
 from experiments.record.journal import Journal, read_journal
+from experiments.record.names import Place
 from experiments.record.rebuild import table
 from experiments.record.replay import RunPosition
 from experiments.run import run
@@ -29,7 +30,7 @@ from experiments.session.history import GrowingHistory
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
 from experiments.session.steps import Outcome, Step, step_record
-from experiments.study.folders import Place, place
+from experiments.study.folders import place
 from experiments.synthetic.answers import SyntheticParticipant, synthetic_participant_of
 from tests.designs import direction_with
 

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from experiments.design.plan import Plan
 from experiments.record import storage
-from experiments.study.balance import journals, used_rows
+from experiments.record.names import journals
+from experiments.study.balance import used_rows
 from experiments.study.folders import (
     Place,
     PlaceError,

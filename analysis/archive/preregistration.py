@@ -13,10 +13,10 @@ from analysis.summary.planned_files import planned_files
 from experiments.clock import Clock
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
+from experiments.record.names import journals
 from experiments.record.provenance import provenance
 from experiments.study.folders import PlaceError, StudyFolder, open_study
 from experiments.study.preregistration import (
-    JOURNALS,
     STUDY_FILE,
     Preregistration,
     PreregistrationError,
@@ -51,7 +51,7 @@ def freeze(folder: Path, reason: str, clock: Clock) -> Frozen:
     if reason:
         check_reason(reason)
     planned, chain = _planned(study), read_chain(folder)
-    if problems := [*chain.problems, *missing(chain, carried_by(folder.glob(JOURNALS)))]:
+    if problems := [*chain.problems, *missing(chain, carried_by(journals(study.results)))]:
         raise PreregistrationError("\n".join(problems))
     now = files_now(study.source, study.config, study.setups)
     since = () if chain.last is None else changes(chain.last.files, now)
@@ -89,7 +89,7 @@ def _begun(study: StudyFolder) -> Iterator[str]:
     """The runs of people that there are, also those that were set aside or cannot be read; practices are none."""
     for setup in study.setups:
         name = setup.config.experiment
-        for path in sorted(study.results.glob(f"sub-*/sub-*_task-{name}_journal*.jsonl")):
+        for path in journals(study.results, name, aside=True):
             code, aside = path.parent.name.removeprefix("sub-"), ", set aside" if ".aside-" in path.name else ""
             try:
                 head = journal.head(path)

@@ -27,8 +27,9 @@ from analysis.summary.results import STATISTICS_FILE
 from device.messages import RecoilError, escaped, first_few
 from experiments.record import journal, storage
 from experiments.record.lines import strict_json
+from experiments.record.names import shots_path
 from experiments.record.provenance import recoil_version
-from experiments.record.rebuild import rebuild, shots_path, shots_table
+from experiments.record.rebuild import rebuild, shots_table
 from experiments.study.folders import PlaceError
 from experiments.study.register import REGISTER_FILE
 

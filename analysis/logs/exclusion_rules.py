@@ -42,6 +42,7 @@ from analysis.stats.arrays import BoolArray
 from analysis.times.own_trials import timed
 from device.messages import first_few
 from experiments.config.door import Model, Seconds, Share
+from experiments.config.findings import CODE
 from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR
 from experiments.record.design_table import ANTICIPATION_S
@@ -82,7 +83,7 @@ class AccuracyRule(Model):
 class ExcludedCode(Model):
     """A participant who does not count, and why."""
 
-    code: Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,32}$")]
+    code: Annotated[str, Field(pattern=f"^{CODE}$")]
     study: ShortText | None = None
     reason: ShortText
 

@@ -15,7 +15,8 @@ from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.messages import first_few, how_many
 from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError
-from experiments.record.rebuild import JOURNAL_NAME, began_with, misnamed, rows_beyond, table
+from experiments.record.names import JOURNAL_NAME, misnamed
+from experiments.record.rebuild import began_with, rows_beyond, table
 from experiments.record.tables import FILE_SUFFIX, DataKind
 from experiments.session.history import answered
 from experiments.study.folders import data_of

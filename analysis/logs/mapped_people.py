@@ -13,7 +13,7 @@ from analysis.logs.files import BadLogError
 from analysis.logs.patterns import Pattern, group_in, groups_in
 from experiments.config.door import Model
 from experiments.record import tables
-from experiments.study.folders import is_code
+from experiments.record.names import is_code
 
 ShortText = Annotated[str, Field(min_length=1, max_length=500)]
 

@@ -6,7 +6,6 @@ rules of the cells come first, then whose log it is, then what binds the cells o
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -42,11 +41,11 @@ from analysis.logs.texts import (
 )
 from analysis.stats.arrays import BoolArray
 from experiments.record import tables
+from experiments.record.names import is_code
 from experiments.record.tables import CLOCK_SET_BACK, REPEATED, Column
 
 Integers = NDArray[np.int64]
 
-_CODE = re.compile(r"[A-Za-z0-9]{1,32}")
 _NO_ROWS: Integers = np.empty(0, dtype=np.int64)
 
 
@@ -221,7 +220,7 @@ def _one_participant(table: _Table, names: Mapping[int, str | None]) -> _LogRule
     own = column.codes[table.first]
     named = [names.get(log) for log in table.texts.logs]
     both = zip(table.codes, named, strict=True)
-    unfit = [not _CODE.fullmatch(code) or name not in (None, code) for code, name in both]
+    unfit = [not is_code(code) or name not in (None, code) for code, name in both]
     others = np.flatnonzero(column.codes != np.repeat(own, table.texts.rows))
     return np.append(table.first[np.array(unfit)], others), partial(_say_participant, table, names)
 
@@ -231,7 +230,7 @@ def _say_participant(table: _Table, names: Mapping[int, str | None], row: int) -
     code, own = (str(table.value("participant_id", one)) for one in (row, rows.start))
     if code != own:
         message = f"{quoted(code)} after {own!r} (rule: one participant a file)"
-    elif not _CODE.fullmatch(code):
+    elif not is_code(code):
         message = f"{quoted(code)} is not a code (rule: 1 to 32 letters or digits, A-Z, a-z, 0-9)"
     else:
         rule = f"sub-{names[table.texts.logs[place]]} (rule: one participant a file, the one in its name)"

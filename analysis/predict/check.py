@@ -17,7 +17,8 @@ from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.limits import check_methods
 from experiments.load import find, load_gun, load_setup, load_study
-from experiments.study.preregistration import JOURNALS, FreezeStatus, carried_by, numbers_there
+from experiments.record.names import journals
+from experiments.study.preregistration import FreezeStatus, carried_by, numbers_there
 
 EXAMPLE_SEED = 1
 """Orders are shown for this seed if the config gives none; a run without a seed draws its own."""
@@ -60,7 +61,7 @@ AnyCheck = DesignCheck | StudyCheck | GunCheck | PaperCheck
 def check(name: str, seed: int | None, participants: int) -> AnyCheck:
     """What any config means, and how it stands beside its preregistration. `ConfigError` names what is wrong."""
     found, path = _meaning(name, seed, participants), find(name)
-    carried = [*carried_by(path.parent.glob(JOURNALS))] if isinstance(found, StudyCheck) else []
+    carried = [*carried_by(journals(path.parent / "results"))] if isinstance(found, StudyCheck) else []
     if not carried and not numbers_there(path.parent):
         return found
     from experiments.study.folders import freeze_status  # noqa: PLC0415 - of use for what was frozen alone

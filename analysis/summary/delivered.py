@@ -13,11 +13,9 @@ import numpy as np
 
 from analysis.logs.journals import journal_of
 from experiments.delivered.marks import START_SHOTS
-from experiments.record.journal import ENDING
+from experiments.record.names import shots_path
 from experiments.record.tables import unguard
 from experiments.session.remarks import NOT_DELIVERED
-
-SHOTS_ENDING = "_shots.csv"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +83,7 @@ def delivered_courses(logs: Iterable[Path]) -> tuple[DeliveredCourse, ...]:
 
 
 def _courses(log: Path) -> Iterator[DeliveredCourse]:
-    path = Path(journal_of(str(log)).removesuffix(ENDING) + SHOTS_ENDING)
+    path = shots_path(Path(journal_of(str(log))))
     if not path.is_file():
         return
     try:

@@ -14,6 +14,7 @@ from analysis.logs.journals import RunFile, journal_of, run_file
 from analysis.logs.reading import Logs
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
+from experiments.record.names import journals
 from experiments.study.folders import freeze_status
 from experiments.study.preregistration import Chain, FreezeStatus, read_chain
 from experiments.study.register import Register, read_register
@@ -128,7 +129,7 @@ def _given(results: Path, logs: Logs, runs: Iterable[RunFile]) -> dict[str, RunF
 def _not_given(results: Path, logs: Logs, given: Collection[str]) -> Sequence[RunFile]:
     """The runs that it does not know."""
     known = {*given, *(real_place(journal_of(str(problem.file))) for problem in logs.problems)}
-    there = map(str, sorted(results.glob("sub-*/sub-*_journal.jsonl")))
+    there = map(str, journals(results))
     return [file for path in there if path not in known and (file := run_file(path, str(results)))]
 
 

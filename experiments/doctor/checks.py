@@ -50,6 +50,7 @@ from experiments.doctor.figures import (
 from experiments.doctor.verdicts import Latencies, latencies, pooled
 from experiments.record import journal, storage
 from experiments.record.journal import JournalError
+from experiments.record.names import journals
 from experiments.record.provenance import recoil_version
 from experiments.screens.display import unset_display
 from experiments.study.folders import PlaceError
@@ -372,7 +373,7 @@ def _language(asked: LanguageAsked) -> tuple[DoctorFinding, ...]:
 
 
 def _latencies(results: Path) -> Iterator[Latencies]:
-    for path in sorted(results.glob("sub-*/sub-*_journal.jsonl")):
+    for path in journals(results):
         try:
             yield latencies(journal.read_journal(path).records)
         except JournalError:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,15 +12,12 @@ from pathlib import Path
 from device.messages import how_many
 from experiments.config.door import ConfigError, checked_table
 from experiments.design.config import DesignConfig
-from experiments.design.plan import Plan
 from experiments.record import design_columns, design_table, replay, storage
-from experiments.record.journal import ENDING, Contents, Head, JournalError, read_journal
+from experiments.record.journal import Contents, Head, JournalError, read_journal
+from experiments.record.names import misnamed, shots_path, table_beside
 from experiments.record.provenance import recoil_version
 from experiments.record.shots_table import SHOTS, shot_rows
 from experiments.record.tables import table_bytes
-
-JOURNAL_NAME = re.compile(r"sub-([A-Za-z0-9]{1,32})_task-([a-z]+)(_practice)?_journal(\.aside-[0-9]+)?\.jsonl$")
-"""The name of a run's journal: code, experiment, whether it is a practice's, whether it was set aside."""
 
 
 def began_with(head: Head) -> DesignConfig:
@@ -83,23 +79,6 @@ def shots_table(contents: Contents) -> bytes | None:
     return table_bytes(SHOTS, rows) if rows else None
 
 
-def shots_path(journal: Path) -> Path:
-    """Where the table of what a sensor measured lies, beside its journal."""
-    return journal.with_name(journal.name.replace(ENDING, "_shots.csv"))
-
-
-def misnamed(path: Path, plan: Plan) -> str:
-    """Whose a journal is that lies under another run's name; empty if it is where it belongs, or says no name."""
-    name = JOURNAL_NAME.search(path.name)
-    if name is None or (name[1], name[2]) == (plan.participant_id, plan.experiment):
-        return ""
-    back = f"sub-{plan.participant_id}_task-{plan.experiment}{ENDING}"
-    return (
-        f"is of participant {plan.participant_id}, experiment {plan.experiment}; was it renamed? (rule: a journal is "
-        f"called as its run, {back}); put it back there, and the right one here"
-    )
-
-
 def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
     """The table of a journal: where it belongs, its bytes, and what the journal holds.
 
@@ -108,8 +87,7 @@ def rebuild(path: Path) -> tuple[Path, bytes, Contents]:
     contents = read_journal(path)
     if said := misnamed(path, contents.plan):
         raise JournalError(f"{path}: {said}")
-    name = path.name.replace("_journal", f"_{began_with(contents.head).table}")
-    return path.with_name(name).with_suffix(".csv"), table(contents), contents
+    return table_beside(path, began_with(contents.head).table), table(contents), contents
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,5 +145,5 @@ def rebuild_table(path: Path) -> RebuiltTable:
     kept = _kept(table, data, messages)
     measured = shots_table(contents)
     if measured is not None:
-        _kept(path.with_name(path.name.replace("_journal", "_shots")).with_suffix(".csv"), measured, messages)
+        _kept(shots_path(path), measured, messages)
     return RebuiltTable(table=table, rebuilt=not kept, messages=tuple(messages))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from experiments.config.setup import Setup
@@ -11,13 +11,8 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.record import journal
 from experiments.record.journal import Head, JournalError, ParticipantKind
+from experiments.record.names import journals
 from experiments.study.register import Register
-
-
-def journals(results: Path, experiment: str) -> Iterator[Path]:
-    """The journals of an experiment in a results folder."""
-    yield from sorted(results.glob(f"sub-*/sub-*_task-{experiment}_journal.jsonl"))
-
 
 HeadOf = Callable[[Path], Head | None]
 """Gives the head of a journal; `None` where nothing in it was acknowledged."""

@@ -16,8 +16,9 @@ from experiments.clock import Clock
 from experiments.config.door import ConfigError, EligibilityConfig, Fact
 from experiments.load import load_study
 from experiments.record.journal import JournalError
+from experiments.record.names import is_code
 from experiments.study import folders, register
-from experiments.study.folders import RETEST, PlaceError, StudyFolder, is_code, look_at
+from experiments.study.folders import RETEST, PlaceError, StudyFolder, look_at
 from experiments.study.preregistration import STUDY_FILE
 from experiments.study.register import RegisterError
 from experiments.study.study import Facts, Member, Participant, RunProgress, eligible, unanswered, unasked

@@ -7,7 +7,6 @@ begins just then has patience; so looking never stands in the way of a run.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -15,7 +14,6 @@ from pathlib import Path
 
 from device.messages import RecoilError
 from experiments.config.door import ConfigError, StudyConfig
-from experiments.config.findings import CODE
 from experiments.config.setup import Setup
 from experiments.design import planning
 from experiments.design.config import DesignConfig
@@ -24,6 +22,7 @@ from experiments.design.planned import order_shown
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
+from experiments.record.names import Place, is_code
 from experiments.record.rebuild import began_with
 from experiments.session.history import answered
 from experiments.session.practice_rounds import is_to_be_repeated
@@ -41,57 +40,12 @@ from experiments.study.preregistration import (
 from experiments.study.register import Register
 from experiments.study.study import Member, NextParticipant, Participant, RunProgress, RunState, by_code, who_is_next
 
-_CODE = re.compile(CODE)
-
 
 class PlaceError(RecoilError):
     """A participant or folder that cannot be used; the message names value and rule."""
 
 
 RETEST = "a retest is a copy of the config under another name (key design), and somebody else has a code of their own"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """The files of one participant in one experiment."""
-
-    results: Path
-    participant_id: str
-    experiment: str
-    practice: bool = False
-    suffix: str = ""
-
-    @property
-    def folder(self) -> Path:
-        """The participant's folder."""
-        return self.results / f"sub-{self.participant_id}"
-
-    @property
-    def stem(self) -> str:
-        """How the names of the files begin."""
-        practice = "_practice" if self.practice else ""
-        return f"sub-{self.participant_id}_task-{self.experiment}{practice}"
-
-    @property
-    def journal(self) -> Path:
-        """The journal: the truth."""
-        return self.folder / f"{self.stem}_journal.jsonl"
-
-    @property
-    def table(self) -> Path:
-        """The table made from it."""
-        suffix = self.suffix or tables.FILE_SUFFIX.get(self.experiment, "trials")
-        return self.folder / f"{self.stem}_{suffix}.csv"
-
-    @property
-    def shots(self) -> Path:
-        """What a sensor measured of each shot; only where there was one."""
-        return self.folder / f"{self.stem}_shots.csv"
-
-
-def is_code(text: str) -> bool:
-    """Whether a text can be a participant's code."""
-    return _CODE.fullmatch(text) is not None
 
 
 def check_code(participant_id: str) -> None:

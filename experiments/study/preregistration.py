@@ -35,8 +35,6 @@ from experiments.study.changes import (
 )
 
 STUDY_FILE = "study.toml"
-JOURNALS = "results/sub-*/sub-*_journal.jsonl"
-"""Where the journals of a study lie, below its folder."""
 _NAME = re.compile(r"preregistration-([1-9][0-9]{0,5})\.(json|md)")
 _RESTORE = "put the original back, from a copy"
 SHORT = 12

@@ -21,6 +21,7 @@ from experiments.design.config import DesignConfig
 from experiments.load import load_setup, load_study
 from experiments.record import storage
 from experiments.record.journal import begun
+from experiments.record.names import Place
 from experiments.record.provenance import git_commit, recoil_version
 from experiments.record.rebuild import rebuild
 from experiments.run import run
@@ -136,6 +137,6 @@ def _take_part(study: ReproducedStudy, setup: Setup[DesignConfig], code: str, re
         storage.write_whole(table, data)
 
 
-def _finished(where: folders.Place) -> bool:
+def _finished(where: Place) -> bool:
     before = begun(where.journal) if where.journal.exists() else None
     return before is not None and before.finished

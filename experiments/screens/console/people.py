@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from experiments.clock import date_text
+from experiments.record.names import is_code
 from experiments.screens.phrases import phrase
 from experiments.study.enrolment import left_to_do, passed_over, run_of
-from experiments.study.folders import Overview, is_code
+from experiments.study.folders import Overview
 from experiments.study.study import Participant, RunProgress, taking_part
 
 _CELL = {"done": "done", "not begun": "–", "unreadable": phrase("cannot be read"), "synthetic": "synthetic"}
