@@ -187,6 +187,7 @@ def binomial_p(p: str, n: int, *, chance: str = "1/2", counts: Sequence[int] | N
         above=above,
         contradicts=() if judged.verdict == "attainable" else (f"n = {n}", f"counts {shown}"),
         numbers=((f"counts of {n} that give p", fitting),),
+        number=printed,
     )
 
 

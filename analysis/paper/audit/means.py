@@ -111,6 +111,7 @@ def grim(
         below=below,
         above=above,
         contradicts=() if judged.witness else (f"n = {n}", f"grain {grain}"),
+        number=printed,
     )
 
 
@@ -198,17 +199,21 @@ def percent_of_count(percent: str, count: int, n: int) -> CheckResult:
     judged = judge_readings(_share_attempt(printed, count, n), others)
     fitting = _sums_by_rounding(printed, n, AnswerScale(Fraction(1), low=0, high=1))
     below, above = nearest(printed.value, Fraction(1, n), Fraction(0), (0, n))
+    people, share = f"{count} of {n}", Fraction(count, n)
     return CheckResult(
         check="percent of count",
-        printed=f"{count} of {n}, {printed.text}",
+        printed=f"{people}, {printed.text}",
         judged=judged,
-        reason=f"{count} of {n} is {decimal(Fraction(100 * count, n), 3)} %",
+        reason=f"{people} is {decimal(100 * share, 3)} %",
         source="definition of a percentage",
         step=Fraction(1, n),
         below=below,
         above=above,
         contradicts=() if judged.verdict == "attainable" else (f"count {count}", f"n = {n}"),
         numbers=((f"counts of {n} that print {printed.text}", fitting or "none"),),
+        number=printed,
+        of=people,
+        share=share,
     )
 
 
@@ -268,6 +273,7 @@ def grimmer(
         below=below,
         above=above,
         contradicts=() if judged.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
+        number=spread,
     )
 
 
@@ -397,6 +403,7 @@ def debit(mean: str, sd: str, n: int) -> CheckResult:
         below=below,
         above=above,
         contradicts=() if judged.verdict == "attainable" else (f"M = {means.text}", f"n = {n}"),
+        number=spread,
     )
 
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import cast, get_args
 
 from analysis.paper.audit.claims import AuditFinding
-from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, PrintedNumber, decimal, read_printed
+from analysis.paper.audit.printed import ROUNDINGS, AuditVerdict, CheckResult, PrintedNumber, decimal
 from analysis.paper.paper import ComparisonRow, ComparisonVerdict, Prediction
 from analysis.report.section import Section, Table
 from analysis.report.serial import beside
@@ -150,7 +150,8 @@ def cut(text: str, most: int) -> str:
 ATTENTION = ("not attainable", "only under a reading")
 """The verdicts that ask something of a paper."""
 _IN_FULL = (*ATTENTION, "refused")
-_DATA = ("grim", "grimmer", "debit", "repeated-measures F", "between-subjects F")
+_RATIOS = ("repeated-measures F", "between-subjects F")
+_DATA = ("grim", "grimmer", "debit", *_RATIOS)
 FAIRNESS = (
     "A number that is not attainable is a number to ask about: the verdict says that no data of the stated kind give "
     "it, not how it came about, and often one misprinted digit explains it. “Attainable” says that some data give the "
@@ -169,9 +170,9 @@ def nearest_text(result: CheckResult) -> str:
 
     Where both sides are one value, the number is on the lattice. Spreads are kept as squares, and shown as roots.
     """
-    if result.check not in _UNITS:
+    if result.number is None:
         return ""
-    shown = [_UNITS[result.check](result, value) for value in (result.below, result.above) if value is not None]
+    shown = [_UNITS[result.check](result.number, value) for value in (result.below, result.above) if value is not None]
     return " and ".join(dict.fromkeys(shown))
 
 
@@ -217,17 +218,17 @@ def _not_attainable(finding: AuditFinding) -> tuple[str, str]:
 
 
 def _percentage_rescue(result: CheckResult) -> str:
-    share, counts = _number(result, _share(result)), result.numbers[0][1]
+    counts = result.numbers[0][1]
     count = "" if counts == "none" else f", or with the percentage as printed the count {counts}"
     return (
         "Neither another rounding nor a smaller number of people who answered rescues it; with the count as printed "
-        f"the percentage would have to be {share}{count}, so a misprint of one of them would explain it."
+        f"the percentage would have to be {_share(result)}{count}, so a misprint of one of them would explain it."
     )
 
 
-def _share(result: CheckResult) -> Fraction:
-    count, _, rest = result.printed.partition(" of ")
-    return Fraction(int(count), int(rest.partition(",")[0]))
+def _share(result: CheckResult) -> str:
+    """What the percentage would have to be."""
+    return "" if result.number is None or result.share is None else _number(result.number, result.share)
 
 
 def _undecided(finding: AuditFinding) -> tuple[str, str]:
@@ -269,12 +270,11 @@ def _refused(result: CheckResult) -> str:
     if result.check == "percent of count":
         counts = result.numbers[0][1]
         whose = "no count of them has that percentage" if counts == "none" else f"that is the percentage of {counts}"
-        people, _, percent = result.printed.partition(", ")
-        return f"{people} people are {_number(result, _share(result))}, not {percent}; {whose}"
-    if result.check.endswith(" F"):
-        grain = result.reason.partition(":")[0]
+        percent = "" if result.number is None else result.number.text
+        return f"{result.of} people are {_share(result)}, not {percent}; {whose}"
+    if result.check in _RATIOS:
         shown = f"the nearest F that such {_nearest_verb(nearest)}" if nearest else "no such data give it"
-        return f"{result.printed} is not attainable from {grain}: {shown}"
+        return f"{result.printed} is not attainable from {result.of}: {shown}"
     needed = f"; it would have to be {nearest.replace(' and ', ' or ')}" if nearest else ""
     found = "; ".join(f"{name}: {value}" for name, value in result.numbers if value not in result.reason)
     return f"{_subject(result)} is not attainable: {result.reason}{needed}{f'; {found}' if found else ''}"
@@ -295,35 +295,28 @@ def _tried(result: CheckResult) -> str:
     return ", ".join(["any rounding, truncation", *others])
 
 
-def _number(result: CheckResult, value: Fraction) -> str:
+def _number(printed: PrintedNumber, value: Fraction) -> str:
     """In the unit and to the digits of the printed number; a tie, which prints in two ways, to its own last digit."""
-    printed = _printed(result)
     percent = "%" in printed.text
     shown, digits = value * (100 if percent else 1), _digits(printed)
     tie = (shown * 10**digits % 1) == Fraction(1, 2)
     return f"{float(shown):.{digits + tie}f}{' %' if percent else ''}"
 
 
-def _one_digit_more(result: CheckResult, value: Fraction) -> str:
-    printed = _printed(result)
+def _one_digit_more(printed: PrintedNumber, value: Fraction) -> str:
     percent = "%" in printed.text
     return decimal(value * (100 if percent else 1), _digits(printed) + 1) + (" %" if percent else "")
 
 
-def _root(result: CheckResult, value: Fraction) -> str:
-    return f"SD {sqrt(value):.{_digits(_printed(result)) + 1}f}"
-
-
-def _printed(result: CheckResult) -> PrintedNumber:
-    """The last number of what is printed, such as the SD of "M = 5.21, SD = 1.60"."""
-    return read_printed(result.printed.rpartition("=")[2].rpartition(",")[2])
+def _root(printed: PrintedNumber, value: Fraction) -> str:
+    return f"SD {sqrt(value):.{_digits(printed) + 1}f}"
 
 
 def _digits(printed: PrintedNumber) -> int:
     return len(printed.text.strip("% ").partition(".")[2])
 
 
-_UNITS: Mapping[str, Callable[[CheckResult, Fraction], str]] = MappingProxyType(
+_UNITS: Mapping[str, Callable[[PrintedNumber, Fraction], str]] = MappingProxyType(
     {
         "grim": _one_digit_more,
         "percent of count": _one_digit_more,

@@ -20,7 +20,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator
 
-from analysis.report.serial import beside, written
+from analysis.report.serial import UNWRITTEN, beside, written
 from device.messages import first_few
 
 Relation = Literal["=", "<", "<=", ">", ">="]
@@ -276,7 +276,8 @@ class CheckResult:
 
     `step` is the distance of neighbouring attainable values, `below` and `above` the nearest ones on both sides of the
     printed value (None where there is none or none was proved), `contradicts` the other numbers it cannot stand
-    beside, `numbers` what else the proof rests on.
+    beside, `numbers` what else the proof rests on. For sentences: the `number` that is judged where it has nearest
+    values to tell, what it is `of` (so many of the people, scores of a kind), and the `share` that was counted.
     """
 
     check: str
@@ -289,6 +290,9 @@ class CheckResult:
     above: Fraction | None = None
     contradicts: tuple[str, ...] = ()
     numbers: tuple[tuple[str, str], ...] = field(default=(), metadata=written(dict))
+    number: PrintedNumber | None = field(default=None, metadata=UNWRITTEN)
+    of: str = field(default="", metadata=UNWRITTEN)
+    share: Fraction | None = field(default=None, metadata=UNWRITTEN)
 
     @property
     def verdict(self) -> AuditVerdict:

@@ -337,6 +337,8 @@ def _result(
         above=sides[1],
         contradicts=() if judged.verdict in {"attainable", "undecided"} else (means, f"sizes {claim.sizes}"),
         numbers=_numbers(claim, check),
+        number=claim.F,
+        of=grain,
     )
 
 
