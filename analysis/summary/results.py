@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -331,6 +331,10 @@ class DesignSummary:
     def label(self, factor: str, level: Level) -> str:
         """What a level of a factor is called in print; a number with its unit, or the name of its factor."""
         return self.labels.get(factor, {}).get(shown_level(level)) or level_words(factor, level)
+
+    def condition(self, levels: Mapping[str, Level], word: Callable[[str], str]) -> str:
+        """What a condition is called: its levels by what each is called, as `word` has it on a page or in a figure."""
+        return ", ".join(word(self.label(factor, level)) for factor, level in levels.items())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,7 +33,6 @@ from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
 from analysis.summary.results import DesignSummary
 from analysis.summary.thresholds import ConditionFit, Thresholds
-from experiments.design.language import Level
 from experiments.design.methods_section import factor_words
 
 MOST_PANELS = 19
@@ -190,11 +189,6 @@ def neighbours_joined(points: Sequence[ShareAtLevel]) -> list[ShareAtLevel]:
     ]
 
 
-def drawn_condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
-    """What a condition is called in a figure: its levels, by what they are called."""
-    return ", ".join(drawn_name(found.label(factor, level)) for factor, level in levels.items())
-
-
 def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thresholds) -> None:
     for axes in grid:
         if of.guess is not None:
@@ -211,7 +205,7 @@ def _label(figure: Figure, grid: Sequence[Axes], found: DesignSummary, of: Thres
     figure.supylabel(_LABELS[of.share], fontsize=9.0)
     if len(of.conditions) > 1:
         for i, condition in enumerate(of.conditions[:_MOST_CURVES]):
-            name = drawn_condition(found, condition.levels)
+            name = found.condition(condition.levels, drawn_name)
             grid[0].plot([], [], **method_look(i), markersize=4.5, linewidth=1.3, label=name)
     if grid[0].get_legend_handles_labels()[1]:
         legend_below(figure, grid[0], 3, factor_words(of.factor))

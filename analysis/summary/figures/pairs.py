@@ -8,6 +8,7 @@ import numpy as np
 
 from analysis.report.figures.style import (
     drawn,
+    drawn_name,
     legend_below,
     light_grid,
     method_colour,
@@ -15,7 +16,6 @@ from analysis.report.figures.style import (
     name_ticks,
     width_for,
 )
-from analysis.summary.figures.functions import drawn_condition
 from analysis.summary.pairs import PairedComparison
 from analysis.summary.results import DesignSummary
 
@@ -44,7 +44,7 @@ def figure_pairs(found: DesignSummary, of: PairedComparison, path_stem: Path) ->
                 marker=method_marker(i),
                 linestyle="none",
                 capsize=3.0,
-                label=drawn_condition(found, condition.levels),
+                label=found.condition(condition.levels, drawn_name),
             )
         name_ticks(axes, [found.label(of.factor, item) for item in of.items])
         axes.set_ylabel("score [logits]")

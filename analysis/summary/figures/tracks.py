@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.report.figures.style import (
     drawn,
+    drawn_name,
     legend_below,
     light_grid,
     method_colour,
@@ -18,7 +19,6 @@ from analysis.report.figures.style import (
     method_marker,
     panel_grid,
 )
-from analysis.summary.figures.functions import drawn_condition
 from analysis.summary.results import DesignSummary
 from analysis.summary.thresholds import Thresholds
 from analysis.summary.tracks import TrackAnswers
@@ -46,7 +46,7 @@ def figure_tracks(found: DesignSummary, of: Thresholds, path_stem: Path) -> None
         figure.supylabel(factor_words(of.factor), fontsize=9.0)
         if len(conditions) > 1:
             for i, levels in enumerate(conditions):
-                name = drawn_condition(found, dict(levels))
+                name = found.condition(dict(levels), drawn_name)
                 grid[0].plot([], [], color=method_colour(i), marker=method_marker(i), label=name)
             legend_below(figure, grid[0], 3, _X_LABEL)
         else:

@@ -312,9 +312,9 @@ _WITH_STIMULUS = "trials with a stimulus"
 
 def _condition(found: DesignSummary, cell: ConditionSummary) -> str:
     """The levels of a condition, by what they are called."""
-    levels = [display_name(found.label(name, level)) for name, level in cell.levels.items()]
+    levels = found.condition(cell.levels, display_name)
     rest = "catch trials" if cell.catch else "" if levels else _WITH_STIMULUS if cell.catch is False else "all trials"
-    return ", ".join(filter(None, [*levels, rest]))
+    return ", ".join(filter(None, (levels, rest)))
 
 
 def _shown(cell: ConditionSummary) -> float | None:

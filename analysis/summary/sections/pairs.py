@@ -93,8 +93,7 @@ def _circles_words(found: DesignSummary, of: PairedComparison) -> Iterator[str]:
 
 
 def _condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
-    named = ", ".join(display_name(found.label(name, level)) for name, level in levels.items())
-    return f" with {named}" if named else ""
+    return f" with {found.condition(levels, display_name)}" if levels else ""
 
 
 def _item(found: DesignSummary, of: PairedComparison, shown: str) -> str:

@@ -268,12 +268,11 @@ def threshold_words(found: DesignSummary, of: Thresholds) -> Iterator[str]:
 
 
 def _condition(found: DesignSummary, levels: Mapping[str, Level]) -> str:
-    named = ", ".join(display_name(found.label(name, level)) for name, level in levels.items())
-    return f"{named}: " if named else ""
+    return f"{found.condition(levels, display_name)}: " if levels else ""
 
 
 def _cells(found: DesignSummary, levels: Mapping[str, Level]) -> tuple[str, ...]:
-    return (_condition(found, levels).removesuffix(": "),) if levels else ()
+    return (found.condition(levels, display_name),) if levels else ()
 
 
 def _tables(asked: str, found: DesignSummary, of: Thresholds) -> Iterator[Table]:
@@ -317,7 +316,7 @@ def _differences(asked: str, found: DesignSummary, of: Thresholds, digits: int |
         header=("Conditions", "People", "Paired", "Difference", "95 % interval"),
         rows=tuple(
             (
-                " − ".join(_condition(found, side).removesuffix(": ") for side in (one.a, one.b)),
+                " − ".join(found.condition(side, display_name) for side in (one.a, one.b)),
                 str(one.threshold.people),
                 "yes" if one.threshold.within else "no",
                 *(
