@@ -215,10 +215,8 @@ def test_a_note_that_is_half_typed_at_the_emergency_stop_is_kept_and_a_reason_ca
         screen.until(lambda look: look.line)
         screen.keys.type("it got")
         screen.keys.press("F12")
-        look = screen.until(lambda look: look.state == "halted")
-        assert look.line
-        screen.keys.type(" hot\n")
-        screen.until(lambda look: not look.line and look.says("The gun itself says that it is disarmed."))
+        screen.until(lambda look: look.state == "halted" and not look.line)
+        screen.until(lambda look: look.says("The gun itself says that it is disarmed."))
         screen.line("y", "smoke from the coil")
         screen.at("halted")
         screen.keys.press("q")
@@ -226,7 +224,7 @@ def test_a_note_that_is_half_typed_at_the_emergency_stop_is_kept_and_a_reason_ca
     assert code == 130, said
     halted, noted, reason = remarks(journal, "halted", "noted", "halt-reason")
     assert halted["by"] == "experimenter"
-    assert (noted["text"], reason["text"]) == ("it got hot", "smoke from the coil")
+    assert (noted["text"], reason["text"]) == ("note: it got", "smoke from the coil")
     assert records(journal)[-1]["reason"] == "emergency stop"
     check_gun(Watch(str(tmp_path)), journal)
 

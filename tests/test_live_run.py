@@ -1500,7 +1500,7 @@ def test_a_key_that_went_into_what_is_open_on_the_console_is_nobodys_answer(tmp_
 
 
 @pytest.mark.parametrize("where", ["at the console", "on the participant's screen"])
-@pytest.mark.parametrize(("line", "noted"), [("E", "break: bored"), ("N", "bored"), ("G", "flag: bored")])
+@pytest.mark.parametrize(("line", "noted"), [("E", "break: bored"), ("N", "note: bored"), ("G", "flag: bored")])
 def test_an_emergency_stop_takes_a_line_away_that_was_being_typed_and_keeps_it_as_a_note(
     line: str, noted: str, where: str, tmp_path: Path
 ) -> None:

@@ -441,9 +441,7 @@ def _effect(found: DesignSummary, test: DesignTest) -> str:
     """What was tested; of a pair both levels by what they are called."""
     if test.name in _SENSITIVITY and " " not in test.effect:
         return "all conditions"
-    if test.name != "tukey":
-        return condition_words(found, test.effect)
-    return _pair(found, test.effect)
+    return _pair(found, test.effect) if test.name == "tukey" else condition_words(found, test.effect)
 
 
 def _pair(found: DesignSummary, effect: str) -> str:

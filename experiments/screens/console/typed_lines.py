@@ -58,5 +58,4 @@ def line_event(name: keys.Name, trial: Trial, text: str) -> Event | None:
 
 def line_as_note(name: keys.Name, trial: Trial, text: str) -> events.Note:
     """What was typed for something that is not done any more."""
-    kind = {"note": "", "end break": "break: "}.get(name, f"{name}: ")
-    return events.Note(text=f"{kind}{text}", trial=trial)
+    return events.Note(text=f"{'break' if name == 'end break' else name}: {text}", trial=trial)
