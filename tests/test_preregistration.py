@@ -86,6 +86,7 @@ KEYS: dict[str, tuple[tuple[str, str, object, object], ...]] = {
 }
 """Thirty keys: file, key, how its value is written there, what it is and what it becomes."""
 RULES = "[trials]\nresponse_time_min_s = 0.15\ndrop_unanswered = true\n[participants]\nmin_kept_share = 0.8\n"
+COUNTED = "participants who finished {}, given to this analysis and not excluded by hand"
 REQUEST = '[[requests]]\nkind = "bayes-factor"\nof = "direction"\nscale = 0.5\n'
 
 
@@ -393,8 +394,8 @@ def test_runs_before_the_freeze_and_the_people_are_told(study: Path) -> None:
     assert [one.who for one in of_kind(found, "run")] == [("P01",)]
     assert "begun before the freeze" in of_kind(found, "run")[0].what
     assert {(one.what, one.frozen, one.instead) for one in of_kind(found, "participants")} == {
-        ("participants who finished direction", 14, 0),
-        ("participants who finished preference", 14, 1),
+        (COUNTED.format("direction"), 14, 0),
+        (COUNTED.format("preference"), 14, 1),
         ("took part, not eligible: age_years = 40: must be at most 29", None, None),
     }
     assert [(one.what, one.who) for one in of_kind(found, "exclusion")] == [("excluded by hand: fell ill", ("P01",))]
@@ -450,7 +451,7 @@ def test_who_broke_off_has_not_finished_with_a_table_or_without(study: Path) -> 
     broken_off(without)
     broken_off(blank).write_bytes(b'{"n":0')
     assert [(one.what, one.frozen, one.instead, one.who) for one in told(study).deviations] == [
-        ("participants who finished preference", 3, 1, ()),
+        (COUNTED.format("preference"), 3, 1, ()),
         ("began preference and did not finish it", None, None, ("P01", "P02", "P03")),
     ]
 
@@ -492,7 +493,7 @@ def test_who_finished_and_was_not_given_to_the_analysis_is_named(study: Path) ->
     for paths in (folders[:2], tables[:2]):
         ((found,), _) = deviations(read_logs(paths), used)
         assert [(one.what, one.frozen, one.instead, one.who) for one in found.deviations] == [
-            ("participants who finished preference", 4, 2, ()),
+            (COUNTED.format("preference"), 4, 2, ()),
             ("finished preference and not given to this analysis", None, None, ("P03", "P04")),
         ]
     for paths in (folders, tables):
@@ -515,7 +516,7 @@ def test_where_the_results_are_a_link_to_another_disk_the_freeze_is_the_one_besi
     elsewhere.parent.mkdir()
     (study / "results").rename(elsewhere)
     (study / "results").symlink_to(elsewhere)
-    assert [(one.what, one.instead) for one in told(study).deviations] == [("participants who finished preference", 1)]
+    assert [(one.what, one.instead) for one in told(study).deviations] == [(COUNTED.format("preference"), 1)]
     assert frozen_tests(read_logs([study / "results"])) == [TEST | {"of": "preference"}]
     (tmp_path / "shortcut").symlink_to(elsewhere)  # beside which no study lies
     (elsewhere.parent / "preregistration-1.json").write_bytes((study / "preregistration-1.json").read_bytes())
@@ -535,7 +536,7 @@ def test_a_design_is_found_in_the_freeze_however_the_study_names_its_file(
     (study / "requests.toml").write_text(REQUEST.replace("direction", "preference"))
     freeze(study, "", RealClock())
     do(study, "P01")
-    assert [(one.what, one.instead) for one in told(study).deviations] == [("participants who finished preference", 1)]
+    assert [(one.what, one.instead) for one in told(study).deviations] == [(COUNTED.format("preference"), 1)]
     design = Path(os.path.normpath(study / named))
     edited(design.parent, design.name, "fatigue.max_planned_s", "1200.0", 1300.0)
     file = design.as_posix() if elsewhere else "preference.toml"

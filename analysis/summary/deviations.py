@@ -230,7 +230,7 @@ def _participants(looked: FoundStudy, last: Preregistration) -> Iterator[Deviati
         if len(done) != study.participants:
             yield Deviation(
                 kind="participants",
-                what=f"participants who finished {experiment}",
+                what=f"participants who finished {experiment}, given to this analysis and not excluded by hand",
                 frozen=study.participants,
                 instead=len(done),
                 who=tuple(done[study.participants :]),
