@@ -232,6 +232,25 @@ def test_a_second_freeze_writes_an_amendment_where_something_has_changed_and_els
     assert "Reason: a grant." in report(found)
 
 
+@pytest.mark.slow
+def test_a_file_that_an_amendment_adds_or_removes_is_one_deviation_and_not_one_a_key(study: Path) -> None:
+    own, both = (study / "study.toml").read_text(), '["direction.toml", "preference.toml"]'
+    (study / "study.toml").write_text(own.replace(both, '["direction.toml"]'))
+    freeze(study, "", RealClock())
+    do(study, "P01")
+    (study / "study.toml").write_text(own)
+    added = [str(one) for one in freeze_status(study).changes]
+    assert added == [
+        'study.toml: experiments: frozen ["direction.toml"], now ["direction.toml", "preference.toml"]',
+        "preference.toml: added",
+    ]
+    assert "2 keys or files have changed since" in freeze_status(study).lines()[0]
+    assert "\n- `preference.toml` added\n" in freeze(study, "a second question", RealClock()).page.read_text()
+    assert "amended | preference.toml: added, by preregistration 2 | – | – | " in report(told(study)).splitlines()
+    (study / "study.toml").write_text(own.replace(both, '["direction.toml"]'))
+    assert "changed since | preference.toml: removed | – | – | " in report(told(study)).splitlines()
+
+
 def test_what_cannot_be_frozen_is_refused_with_its_place(study: Path, tmp_path: Path) -> None:
     with pytest.raises(PlaceError, match="no study's folder"):
         freeze(tmp_path, "", RealClock())
@@ -372,7 +391,7 @@ def test_a_run_names_what_was_frozen_and_warns_of_what_has_changed(frozen: Path)
     said = [*run_warnings(load_setup(frozen / "preference.toml"), frozen / "results", [])]
     assert "the run goes on" in said[0]
     assert said[1:] == ["gun.toml: voice_coil.voltage_V: frozen 16.0, now 15.0"]
-    assert "1 key has changed since preregistration 1" in changed_text(overview(open_study(frozen)))
+    assert "1 key or file has changed since preregistration 1" in changed_text(overview(open_study(frozen)))
     do(frozen, "P02")
     differing = of_kind(told(frozen), "run")
     assert [(one.what, one.frozen, one.instead, one.who) for one in differing] == [

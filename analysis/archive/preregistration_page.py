@@ -51,11 +51,12 @@ def _head(one: Preregistration) -> Iterator[str]:
 def _changes(found: Sequence[KeyChange]) -> Iterator[str]:
     if found:
         yield "## What it changes"
-        yield _listed([f"`{one.file}` {one.key}: before {_both(one)}" for one in found])
+        yield _listed([f"`{one.file}` {one.key}{_both(one)}" for one in found])
 
 
 def _both(one: KeyChange) -> str:
-    return f"{plain_value(one.frozen)}, from now on {plain_value(one.now)}"
+    """Before and after; of a file that is new or gone, neither."""
+    return "" if one.is_whole_file else f": before {plain_value(one.frozen)}, from now on {plain_value(one.now)}"
 
 
 def _listed(items: Sequence[str]) -> str:

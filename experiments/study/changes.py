@@ -31,14 +31,24 @@ _OF_SETUP: dict[str, type[Model]] = {"experiment": DesignConfig, "gun": GunConfi
 
 
 class KeyChange(Model):
-    """A key of a file that differs: what was frozen and what it is now; `None` where there is nothing."""
+    """A key of a file that differs: what was frozen and what it is now; `None` where there is nothing.
+
+    Of a file that is new or gone there is neither: it is one change, whose `key` says which.
+    """
 
     file: str
     key: str
     frozen: JsonValue
     now: JsonValue
 
+    @property
+    def is_whole_file(self) -> bool:
+        """Is the file itself new or gone?"""
+        return self.frozen is None and self.now is None
+
     def __str__(self) -> str:
+        if self.is_whole_file:
+            return f"{self.file}: {self.key}"
         return f"{self.file}: {self.key}: frozen {plain_value(self.frozen)}, now {plain_value(self.now)}"
 
 

@@ -140,7 +140,7 @@ def _beside(file: str, named: str) -> str:
 
 
 def changes(frozen: Files, now: Files) -> tuple[KeyChange, ...]:
-    """Every key that differs, in the order of the files; a default that is spelled out is the same."""
+    """Every file that is new or gone, and of the others every key that differs; a default spelled out is the same."""
     names = now[STUDY_FILE].get("experiments")
     designs = [_place(str(name)) for name in names] if isinstance(names, list) else []
     guns = [_beside(file, str(now[file].get("gun"))) for file in designs]
@@ -149,8 +149,15 @@ def changes(frozen: Files, now: Files) -> tuple[KeyChange, ...]:
     return tuple(
         change
         for file in dict.fromkeys([*frozen, *now])
-        for change in changed_keys(file, frozen.get(file, {}), now.get(file, {}), models.get(file))
+        for change in _changes_of_file(file, frozen, now, models.get(file))
     )
+
+
+def _changes_of_file(file: str, frozen: Files, now: Files, model: type[Model] | None) -> Iterator[KeyChange]:
+    if file in frozen and file in now:
+        yield from changed_keys(file, frozen[file], now[file], model)
+    else:
+        yield KeyChange(file=file, key="removed" if file in frozen else "added", frozen=None, now=None)
 
 
 def changes_of_run(frozen: Preregistration, setup: object) -> tuple[KeyChange, ...]:
@@ -322,13 +329,13 @@ class FreezeStatus:
         }
 
     def lines(self) -> tuple[str, ...]:
-        """What there is to say: under which preregistration, and every key that has changed since."""
+        """What there is to say: under which preregistration, and every key or file that has changed since."""
         last = self.chain.last
         if last is None:
             return ()
         if not self.changes:
             return (f"Frozen by {last.title}: nothing has changed since",)
-        many = "1 key has" if len(self.changes) == 1 else f"{len(self.changes)} keys have"
+        many = "1 key or file has" if len(self.changes) == 1 else f"{len(self.changes)} keys or files have"
         since = f"{many} changed since; `recoil freeze {self.chain.folder}` writes an amendment"
         return f"Frozen by {last.title}: {since}", *(f"  {change}" for change in self.changes)
 

@@ -75,7 +75,7 @@ def changed_text(seen: Overview) -> str:
     last, changed = seen.frozen.chain.last, len(seen.frozen.changes)
     if last is None or not changed:
         return ""
-    keys = phrase("1 key has") if changed == 1 else phrase("{changed} keys have", changed=changed)
+    keys = phrase("1 key or file has") if changed == 1 else phrase("{changed} keys or files have", changed=changed)
     return phrase(
         "{keys} changed since {title}; `recoil study` names them, and the report will.", keys=keys, title=last.title
     )
