@@ -243,17 +243,19 @@ def test_a_pattern_that_makes_one_code_of_two_people_is_refused(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("code", "pattern"), [("VP_01", r"VP_(\d+)"), ("S-3", r"S\-(\d+)"), ("anna.b", r"anna\.([A-Za-z0-9]+)")]
+    ("code", "pattern", "own"),
+    [("VP_01", r"VP_(\d+)", "VP01"), ("S-3", r"S\-(\d+)", "S3"), ("anna.b", r"anna\.([A-Za-z0-9]+)", "annab")],
 )
 def test_a_code_that_is_none_is_refused_with_both_remedies_and_both_help(
-    code: str, pattern: str, tmp_path: Path
+    code: str, pattern: str, own: str, tmp_path: Path
 ) -> None:
     path = _write(tmp_path / "all.csv", _psychopy(trial_rows(code)))
     (problem,) = _read(path).problems
     assert f"{code!r} is not a code" in str(problem)
     assert f"[participant] pattern = '{pattern}'" in str(problem)
-    assert f'[values.participant] {code!r} = "P01"' in str(problem)
-    for text in (_by_pattern(pattern), _by_pattern(r"^(\w+)$", "[values.participant]", f"'{code}' = \"P01\"")):
+    listed = f'{code!r} = "{own}"'
+    assert f"[values.participant] {listed} gives another one, to each person one of their own" in str(problem)
+    for text in (_by_pattern(pattern), _by_pattern(r"^(\w+)$", "[values.participant]", listed)):
         assert _read(path, text).problems == ()
 
 
@@ -291,7 +293,8 @@ def test_a_bad_map_is_refused_with_file_key_value_and_rule(case: str, tmp_path: 
         (lambda text: text.replace("date", "phase"), "stands 2 times"),
         (lambda text: text.replace(",up,", ',"up,', 1), "is not separated text"),
         (lambda text: text.replace(",d\n", "\n", 1), "line 2: has 6 fields (rule: 7"),
-        (lambda text: text.replace("0.", "zero."), "column response_time_s: 'zero."),
+        (lambda text: text.replace("0.", "zero."), "column key_resp.rt: 'zero."),
+        (lambda text: text.replace("0.", "-0.", 1), "column key_resp.rt: response_time_s -0."),
         (lambda text: text.replace("P01", "P-1"), "is not a code"),
         (lambda text: text.replace("main", "practice"), "has no row left"),
     ],

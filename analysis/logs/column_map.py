@@ -134,6 +134,13 @@ class ColumnMap(LogMap):
     rating: ScaleMapping | None = None
 
     @property
+    def own_columns(self) -> dict[str, str]:
+        """The file's own column for each of Recoil's that the map names."""
+        named = {"participant_id": self.participant.column, **self.columns.model_dump()}
+        named["response_time_s"] = named.pop("response_time")
+        return {name: column for name, column in named.items() if column is not None}
+
+    @property
     def rated_from(self) -> tuple[float, float] | None:
         """The ends of the scale of another program's ratings; `None` of other answers."""
         if self.experiment != "preference":

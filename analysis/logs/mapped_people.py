@@ -80,7 +80,8 @@ def check_person(code: str, where: ParticipantMapping, line: int, cells: Sequenc
 
 def _remedy(code: str, where: ParticipantMapping) -> str:
     """How a map makes a code of a text that is none."""
-    listed = f'[values.participant] {code!r} = "P01" gives another one'
+    own = re.sub("[^A-Za-z0-9]", "", code)[:32] or "P01"
+    listed = f'[values.participant] {code!r} = "{own}" gives another one, to each person one of their own'
     if where.file_name or where.pattern:
         return f"let the pattern's group hold letters and digits alone, or {listed}"
     parts = re.search(r"^(.*?)([0-9]+|[A-Za-z0-9]+)$", code)

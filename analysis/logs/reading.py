@@ -332,8 +332,19 @@ def _checked(waiting: Sequence[WaitingFile], mapping: ColumnMap | None) -> Batch
         except BadLogError as bad:
             batch.logs |= dict.fromkeys(texts.logs, bad)
         else:
-            batch.take(block, logs)
+            batch.take(block, logs if mapping is None or texts in own else _by_own_columns(logs, mapping))
     return batch
+
+
+def _by_own_columns(logs: Mapping[int, Log | BadLogError], mapping: ColumnMap) -> dict[int, Log | BadLogError]:
+    """What is wrong with logs of another program names the columns of their own file."""
+    own = mapping.own_columns
+    return {
+        number: BadLogError(log.message, log.line, own.get(log.column or "", log.column))
+        if isinstance(log, BadLogError)
+        else log
+        for number, log in logs.items()
+    }
 
 
 def _mapped(batch: Batch, first: int, logs: Sequence[MappedLog], mapping: ColumnMap) -> TextTable:
