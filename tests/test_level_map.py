@@ -99,6 +99,52 @@ def test_levels_of_every_size_are_told_in_three_figures(lab: Path, exponent: str
     assert not any("0.000000000" in row or re.search(r"\d{13}", row) for row in rows)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ({"VP_01;links": 20}, "One participant: see the report."),
+        (
+            {"VP_01;links": 20, "VP_02;links": 3, "VP_03;rechts": 3},
+            "1 of 3 participants could be fitted, so there is no mean over people; 2 had too few answers: below 10, or "
+            "at one level.",
+        ),
+        (
+            {"VP_01;links": 20, "VP_02;rechts": 20},
+            "2 of 2 participants could be fitted, no two of them in one condition, so there is no mean over people.",
+        ),
+        (
+            {"VP_01;links": 3, "VP_02;links": 3},
+            "None of 2 participants could be fitted, so there is no mean over people; 2 had too few answers: below 10, "
+            "or at one level.",
+        ),
+    ],
+)
+def test_where_no_two_could_be_fitted_it_says_so_and_who_lacks_answers(
+    lab: Path, rows: dict[str, int], said: str
+) -> None:
+    cells = [
+        f"{who};{6 + 2 * (trial % 5)};{'ja' if trial % 3 else 'nein'};{hand}"
+        for one, trials in rows.items()
+        for who, hand in [one.split(";")]
+        for trial in range(trials)
+    ]
+    (lab / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *cells]) + "\n")
+    (told,) = thresholds_in_short(mapped_thresholds([lab / "lab.csv"], lab / "map.toml", lab / "out")).items
+    assert told == said
+
+
+def test_a_file_with_bad_rows_says_in_one_message_how_many_and_where(lab: Path) -> None:
+    cells = ["VP_01;6,5;ja;links", "VP_01;x;ja;links"] + ["VP_01;6,5;vielleicht;links"] * 1200
+    (lab / "lab.csv").write_text("\n".join(["VP;Reiz;Treffer;Hand", *cells]) + "\n")
+    (problem,) = read_levels([lab / "lab.csv"], load(LevelMap, lab / "map.toml")).problems
+    assert (problem.line, problem.column) == (3, "Reiz")
+    assert problem.message.startswith("'x' is no level (rule: ")
+    assert problem.message.endswith(
+        "; 1,201 rows are bad, on lines 3, 4, 5, 6, 7 and 1,196 more; the whole file is left out"
+    )
+
+
 def test_a_level_that_is_not_there_is_a_trial_without_a_stimulus(lab: Path) -> None:
     (lab / "lab.csv").write_text("VP;Reiz;Treffer;Hand\nVP_01;;nein;links\nVP_01;6,5;ja;links\n")
     read = read_levels([lab / "lab.csv"], load(LevelMap, lab / "map.toml"))

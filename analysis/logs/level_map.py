@@ -7,7 +7,7 @@ which whether the answer was a success (right, or yes), and what makes condition
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -19,10 +19,12 @@ from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
 from analysis.logs.mapped_people import ShortText, check_person, code_in
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
+from device.messages import first_few
 from experiments.config.door import Model
 from experiments.design.language import ColumnName
 from experiments.record import tables
 
+_Row = dict[str, object]
 _TRUTHS = {"1": True, "1.0": True, "true": True, "yes": True, "0": False, "0.0": False, "false": False, "no": False}
 
 
@@ -76,7 +78,7 @@ class MappedLevels:
 def read_levels(paths: Sequence[Path], mapping: LevelMap) -> MappedLevels:
     """The answers in `paths`, files or folders. A file that breaks a rule is a problem, and left out whole."""
     found = find_logs(list(paths), mapping.files_end_with)
-    rows, files, problems = list[dict[str, object]](), list[Path](), list(found.problems)
+    rows, files, problems = list[_Row](), list[Path](), list(found.problems)
     for path in map(Path, found.logs):
         try:
             content = read_content(str(path))
@@ -89,23 +91,41 @@ def read_levels(paths: Sequence[Path], mapping: LevelMap) -> MappedLevels:
     return MappedLevels(table=pd.DataFrame(rows, columns=names), files=tuple(files), problems=tuple(problems))
 
 
-def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap) -> Iterator[dict[str, object]]:
-    """Rows with an answer; whoever did not answer tells nothing."""
-    where, columns = mapping.participant, mapping.columns
+def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap) -> list[_Row]:
+    """Rows with an answer; whoever did not answer tells nothing. `BadLogError`: what is wrong, and with which rows."""
+    rows, faults = list[_Row | None](), list[BadLogError]()
     for line in lines:
-        text = file_name if where.column is None else line.cells[where.column]
-        code = code_in(text, where, mapping.values.participant, line.number)
-        check_person(code, where, line.number, ())
-        success = _success(line, columns.success, mapping.values.success)
-        if success is None:
-            continue
-        condition = line.cells[columns.condition] if columns.condition else tables.MISSING
-        yield {
-            "participant_id": code,
-            "level": _level(line, mapping),
-            "success": float(success),
-            "condition": mapping.values.condition.get(condition, condition) or None,
-        }
+        try:
+            rows.append(_row(line, file_name, mapping))
+        except BadLogError as bad:
+            faults.append(bad)
+    if faults:
+        first, on = faults[0], first_few([one.line for one in faults], _SHOWN)
+        others = f"; {len(faults):,} rows are bad, on lines {on}" if len(faults) > 1 else ""
+        raise BadLogError(f"{first.message}{others}; the whole file is left out", first.line, first.column)
+    return [row for row in rows if row is not None]
+
+
+_SHOWN = 5
+"""So many lines are named in a message."""
+
+
+def _row(line: SeparatedLine, file_name: str, mapping: LevelMap) -> _Row | None:
+    """A row with an answer; `None` without one."""
+    where, columns = mapping.participant, mapping.columns
+    text = file_name if where.column is None else line.cells[where.column]
+    code = code_in(text, where, mapping.values.participant, line.number)
+    check_person(code, where, line.number, ())
+    success = _success(line, columns.success, mapping.values.success)
+    if success is None:
+        return None
+    condition = line.cells[columns.condition] if columns.condition else tables.MISSING
+    return {
+        "participant_id": code,
+        "level": _level(line, mapping),
+        "success": float(success),
+        "condition": mapping.values.condition.get(condition, condition) or None,
+    }
 
 
 def _success(line: SeparatedLine, column: str, known: Mapping[str, bool]) -> bool | None:

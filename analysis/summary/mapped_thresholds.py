@@ -10,6 +10,7 @@ import pandas as pd
 
 from analysis.logs.files import Problem, shown_name
 from analysis.logs.level_map import LevelMap, MappedLevels, read_levels
+from analysis.psychometric.people import FEWEST_ANSWERS
 from analysis.report import placing
 from analysis.report.labels import labelled
 from analysis.report.page import write_page
@@ -98,12 +99,23 @@ def _fitted(read: MappedLevels, mapping: LevelMap) -> Thresholds:
 
 
 def thresholds_in_short(found: MappedThresholds) -> Section:
-    """The group's threshold, or one person's."""
+    """The group's threshold, or why there is none."""
     summary = found.summary
     items = tuple(threshold_sentences(summary, summary.questions[_ASKED]))
-    return Section(
-        title=how_many(found.thresholds.people, "participant"), items=items or ("One participant: see the report.",)
-    )
+    people = how_many(found.thresholds.people, "participant")
+    return Section(title=people, items=items or (_without_mean(found.thresholds, people),))
+
+
+def _without_mean(of: Thresholds, people: str) -> str:
+    """How many were fitted where no condition has two."""
+    fits = [one for condition in of.conditions for one in condition.people if one.fit is not None]
+    fitted = len({one.participant for one in fits})
+    if fitted == of.people == 1:
+        return "One participant: see the report."
+    apart = ", no two of them in one condition" if fitted > 1 else ""
+    few = f"; {of.people - fitted} had too few answers: below {FEWEST_ANSWERS}, or at one level"
+    lacking = few if fitted < of.people else ""
+    return f"{fitted or 'None'} of {people} could be fitted{apart}, so there is no mean over people{lacking}."
 
 
 def _sections(found: MappedThresholds, figures: Path) -> Iterator[Section]:
