@@ -276,6 +276,25 @@ def test_whiskers_of_numbers_are_said_to_be_of_their_logarithms():
         assert section.pictures[0].caption.endswith(f" Whiskers: {said}.")
 
 
+@pytest.mark.parametrize(
+    ("said", "cut"),
+    [
+        (["yes", "yes", "yes", "no"], True),  # 100 %, then 50 with an SD of 71
+        (["yes", "yes", "no", "no"], False),  # 100 %, then 0, with an SD of 0
+    ],
+)
+@pytest.mark.parametrize("kind", ["yes-no", "choice"])
+def test_whiskers_of_shares_are_said_to_end_at_0_and_100_percent_where_they_do(kind, said, cut):
+    answers = {"answers": ["yes", "no"]} if kind == "choice" else {}
+    factors = {"method": {"levels": ["a"]}, "voltage_V": {"levels": [6.0, 10.0]}}
+    table = pd.DataFrame({"participant_id": ["P1", "P2"] * 2, "method": "a", "voltage_V": [6.0, 6.0, 10.0, 10.0]})
+    asked = {"sure": {"kind": kind, "text": "?", **answers}}
+    found = summarise(design(factors=factors, questions=asked), table.assign(sure=said))
+    (section, *_) = sections_of_designs(ReportData(title="T", statistics=StudyStatistics(designs={"test": found})))
+    ends = ", of shares cut off at 0 and 100 %" if cut else ""
+    assert section.pictures[0].caption.endswith(f" Whiskers: the SD between participants{ends}.")
+
+
 def d_prime(hits, signals, alarms, noises):  # Hautus 1995
     return float(np.diff(stats.norm.ppf([(alarms + 0.5) / (noises + 1), (hits + 0.5) / (signals + 1)]))[0])
 

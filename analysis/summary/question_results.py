@@ -123,6 +123,12 @@ class QuestionSummary:
         return answers[0] if shares and answers else None
 
     @property
+    def cut_at_ends(self) -> bool:
+        """Whether an SD of shares reaches beyond 0 or 100 %, where the whiskers of its picture end."""
+        shares = [one for one in self.pictured if one.right is None and self.kind in ("choice", "yes-no")]
+        return any(one.mean is not None and (one.sd or 0.0) > min(one.mean, 1 - one.mean) for one in shares)
+
+    @property
     def compared(self) -> bool:
         """Whether any two conditions were tested against each other."""
         return any(test.name == "tukey" for test in self.tests)

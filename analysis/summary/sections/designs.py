@@ -266,11 +266,10 @@ def _picture(name: str, found: DesignSummary) -> Picture:
     shown = {asked: question for asked, question in found.questions.items() if question.drawn}
     shares = [f"{words} ({asked})" for asked, one in shown.items() if (words := _drawn_words(one))]
     drawn = f" Drawn is {joined_by_and(shares)}." if shares else ""
-    means = "; ".join(f"{asked}: {_means(found, question)}" for asked, question in shown.items())
     return Picture(
         stem=figure_of(name),
         caption=f"{found.title.rstrip('.?!')}.{drawn}{_whiskers([*shown.values()], found.n)}",
-        alt=f"Means by condition. {means}",
+        alt="Means by condition. " + "; ".join(f"{asked}: {_means(found, one)}" for asked, one in shown.items()),
     )
 
 
@@ -292,7 +291,8 @@ def _whiskers(shown: Sequence[QuestionSummary], people: int) -> str:
     if "number" in unscored:
         parts.append(("numbers", "the SD of ln between participants, up and down from the geometric mean"))
     if unscored - {"number"}:
-        parts.append(("others", "the SD between participants"))
+        ends = ", of shares cut off at 0 and 100 %" if any(question.cut_at_ends for question in shown) else ""
+        parts.append(("others", f"the SD between participants{ends}"))
     told = [f"{what} of {of}" for of, what in parts[:-1]]
     told += [f"else {what}" if told else what for _, what in parts[-1:]]
     return f" Whiskers: {', '.join(told)}." if told else ""
