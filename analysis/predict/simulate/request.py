@@ -25,9 +25,6 @@ class ModelRequest:
         return self.scene is not None or bool(self.needs)
 
 
-_OTHER_PICTURES = frozenset([".gif", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".eps", ".ps"])
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulateRequest:
     """What to simulate of which gun. `changes` are KEY=VALUE, `vary` KEY=VALUES; `table` takes the shots over these."""
@@ -47,19 +44,20 @@ class SimulateRequest:
 
     @property
     def plot_stem(self) -> Path | None:
-        """Where the figure goes, without its ending: a dot that begins no such ending belongs to the name.
+        """Where the figure goes, without its ending; what follows a dot with a digit in it, as `.v2`, is of the name.
 
-        `ConfigError`: a folder is there, or there is no name.
+        `ConfigError`: a folder is there, there is no name, or an ending of something else.
         """
         if self.plot is None:
             return None
         if self.plot.is_dir():
             raise ConfigError(f"--plot {self.plot}: is a folder; name a file")
-        if self.plot.suffix.lower() in _OTHER_PICTURES:
+        ending = self.plot.suffix.lower()
+        if ending[1:].isalpha() and ending not in FIGURE_ENDINGS:
             raise ConfigError(f"--plot {self.plot}: figures are PNG, SVG and PDF; name one of these, as in shot.png")
         if self.plot.name.lower() in ("", "..", *FIGURE_ENDINGS):
             raise ConfigError(f"--plot {self.plot}: has no name but its ending; name a file, as in shot.png")
-        return self.plot.with_suffix("") if self.plot.suffix.lower() in FIGURE_ENDINGS else self.plot
+        return self.plot.with_suffix("") if ending in FIGURE_ENDINGS else self.plot
 
     @property
     def figures(self) -> list[Path]:
