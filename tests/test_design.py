@@ -12,14 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from analysis.predict.design_search import run as feature
 from analysis.predict.design_search.choice import rate_at
-from analysis.predict.design_search.figures import shown_up_to_Hz
+from analysis.predict.design_search.figures import AREA_NAMES, figure_critical, shown_up_to_Hz
 from analysis.predict.design_search.results import DesignSearch
 from analysis.predict.design_search.space import axis, make_space, span
 from analysis.predict.fit.percept_model import PAPER_RATES
+from analysis.report.figures import style
 from analysis.report.serial import plain
 from analysis.report.terminal import in_text
 from device.limits import DriveHistory, load_of
@@ -195,6 +198,31 @@ def test_bands_that_are_seen_to_lie_elsewhere_than_their_voltages_say_so(
 ) -> None:
     found = replace(result[1], critical=replace(result[1].critical, interpolation_error_V=error_V))
     assert ("Bands are interpolated on the grid" in in_text(feature.in_short(found))) == is_said
+
+
+@pytest.mark.slow
+def test_the_legend_of_the_contours_names_what_is_drawn_and_a_point_alone_is_marked(
+    result: tuple[Path, DesignSearch], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    critical = result[1].critical
+    line = np.linspace(20.0, 10.0, len(critical.friction_N))
+    below, alone = np.full_like(line, -np.inf), np.where(line == line[0], line, -np.inf)
+    contours = {"nowhere": below, "at one friction": alone, "everywhere": line}
+    first = critical.alternatives[0]
+    changed = replace(
+        critical,
+        voltage_V=line,
+        band=replace(critical.band, low_V=below, high_V=below),
+        alternatives=tuple(replace(first, name=name, voltage_V=volts) for name, volts in contours.items()),
+        both_directions_V=below,
+    )
+    figures: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, _: figures.append(figure))
+    figure_critical(replace(result[1], critical=changed, own=()), tmp_path / "critical")
+    named = {text.get_text() for text in figures[0].legends[0].get_texts()} - {*AREA_NAMES.values()}
+    assert named == {"at one friction", "everywhere", "75 % right"}
+    marked = [one.get_label() for one in figures[0].axes[0].lines if one.get_marker() not in ("None", None)]
+    assert marked == ["at one friction"]
 
 
 @pytest.mark.soak

@@ -173,26 +173,32 @@ def figure_critical(found: DesignSearch, path_stem: Path) -> None:
     with drawn(path_stem, 6.6, 5.2) as figure:
         axes = figure.subplots()
         _areas(axes, field)
-        x, top = field.friction_N, float(field.voltage_V[-1])
-        low, high = (np.clip(part, 0.0, top) for part in (band.low_V, band.high_V))
-        axes.fill_between(x, low, high, color=BLUE, alpha=0.18, linewidth=0.0, label="95 % of the contours drawn")
+        x, bottom, top = field.friction_N, float(field.voltage_V[0]), float(field.voltage_V[-1])
+        low, high = (np.clip(part, bottom, top) for part in (band.low_V, band.high_V))
+        if (high[:-1] + high[1:] > low[:-1] + low[1:]).any():
+            axes.fill_between(x, low, high, color=BLUE, alpha=0.18, linewidth=0.0, label="95 % of the contours drawn")
         for n, (name, voltage_V) in enumerate(others.items()):
             dashes = method_line(n + 1)
             colour = (INK, INK, VERMILION, VERMILION, ORANGE)[n % 5]
-            axes.plot(x, _finite(voltage_V), color=colour, linewidth=1.1, linestyle=dashes, label=name)
+            _contour(axes, x, voltage_V, "x+123"[n % 5], color=colour, linewidth=1.1, linestyle=dashes, label=name)
         name = f"{100.0 * critical.level:g} % right"
-        axes.plot(x, _finite(critical.voltage_V), color=BLUE, linewidth=2.0, label=name)
+        _contour(axes, x, critical.voltage_V, "o", color=BLUE, linewidth=2.0, label=name)
         _marks(axes, field, _own_marks(found, swept=True), None)
         axes.set_xlim(float(x[0]), float(x[-1]))
-        axes.set_ylim(float(field.voltage_V[0]), top)
+        axes.set_ylim(bottom, top)
         axes.set_xlabel("damper friction [N]")
         axes.set_ylabel("voltage [V]")
         axes.set_title(f"Pulse {1e3 * field.pulse_s:.3g} ms", loc="left")
         _legend(figure, axes, field)
 
 
-def _finite(values: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(values), values, np.nan)
+def _contour(axes: Axes, x: FloatArray, values: FloatArray, marker: str, **look: Any) -> None:
+    """A line where neighbours are known, a mark where one alone is; without any nothing, in the legend neither."""
+    known = np.isfinite(values)
+    alone = known & ~np.append(known[1:], False) & ~np.append(False, known[:-1])
+    if known.any():
+        marks = {"marker": marker, "markersize": 6.0, "markevery": alone, "clip_on": False} if alone.any() else {}
+        axes.plot(x, np.where(known, values, np.nan), **look, **marks)
 
 
 def _mesh(axes: Axes, field: MapField, values: FloatArray, map_name: str, ends: tuple[float, float]) -> Any:

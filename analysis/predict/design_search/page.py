@@ -39,7 +39,7 @@ def critical_section(found: DesignSearch, figures: Path) -> Section:
                     "lie wholly within it; other lines: the fit under other assumed numbers, and forward and "
                     "backward shots counted alike"
                 ),
-                alt="A falling line of voltage over friction with its band and five other lines",
+                alt="A falling line of voltage over friction with its band, and the lines under other assumptions",
             ),
         ),
         tables=(_contour_table(found),),
