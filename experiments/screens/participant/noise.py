@@ -1,4 +1,8 @@
-"""Masking noise through the participant's headphones, by PsychoPy's sound, imported only where noise is wanted."""
+"""Masking noise through the participant's headphones. The sound library is imported only where noise is wanted.
+
+Not by PsychoPy's sound: one of an array that is to be repeated for ever ends with its first round, and is silent then
+without a word (2026.2.5).
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,8 @@ from typing import Any
 
 from experiments.screens.participant import messages
 
-_LOOP_S = 10.0
-_RATE_Hz = 44_100
+NOISE_ROUND_S = 10.0
+NOISE_RATE_Hz = 44_100
 _SEED = 20_240  # assumed; any will do, and the same noise for everybody
 
 
@@ -15,7 +19,7 @@ class MaskingNoise:
     """White noise in a loop. Where it cannot play it stays off and says why, in one message."""
 
     def __init__(self) -> None:
-        self._sound: Any = None
+        self._stream: Any = None
 
     def turn(self, asked: messages.Noise) -> messages.NoiseIs:
         """Turn it on or off."""
@@ -23,49 +27,60 @@ class MaskingNoise:
         if not asked.on:
             return messages.NoiseIs(on=False, message="", ask=asked.ask)
         try:
-            self._sound = _playing(asked.level)
-        except (KeyboardInterrupt, SystemExit):
-            raise
-        except BaseException as error:  # noqa: BLE001 - PsychoPy raises plain Exception, and some that derive from BaseException alone
+            self._stream = _playing(asked.level)
+        except Exception as error:  # noqa: BLE001 - whatever the sound library says of its devices
             return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
         return messages.NoiseIs(on=True, message="", ask=asked.ask)
 
     @property
     def plays(self) -> bool:
         """Whether it is on, and has not been found to have ended."""
-        return self._sound is not None
+        return self._stream is not None
 
     def ended(self) -> messages.NoiseEnded | None:
         """What is to be said where it was on and ended by itself: a sound device that is gone ends its stream."""
-        if self._sound is None or self._sound.stream._sdStream.active:
+        if self._stream is None or self._stream.active:
             return None
         self.stop()
         return messages.NoiseEnded(message=f"Masking noise has ended: its sound device is gone. {_REMEDY}")
 
     def stop(self) -> None:
         """Silence."""
-        if self._sound is not None:
-            self._sound.stop()
-            self._sound = None
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
 
 
 def _playing(level: float) -> Any:
     # imported when used: looking for sound devices takes seconds, and most studies use none
-    import numpy as np  # noqa: PLC0415
-    from psychopy import prefs  # noqa: PLC0415
-
-    prefs.hardware["audioLib"] = ["sounddevice"]
-    from psychopy import sound  # noqa: PLC0415
-    from sounddevice import query_devices  # noqa: PLC0415
+    from sounddevice import OutputStream, query_devices  # noqa: PLC0415
 
     if not any(device["max_output_channels"] for device in query_devices()):
-        raise RuntimeError("the system lists none")  # PsychoPy takes the first of none
-    mono = np.random.default_rng(_SEED).uniform(-1, 1, int(_LOOP_S * _RATE_Hz))
-    noise = sound.Sound(
-        np.column_stack([mono, mono]), sampleRate=_RATE_Hz, stereo=True, volume=level, loops=-1, hamming=False
-    )
-    noise.play()
-    return noise
+        raise RuntimeError("the system lists none")
+    noise = NoiseLoop(level)
+
+    def fill(out: Any, frames: int, *_: object) -> None:
+        out[:] = noise.block(frames)
+
+    stream = OutputStream(samplerate=NOISE_RATE_Hz, channels=2, dtype="float32", callback=fill)
+    stream.start()
+    return stream
+
+
+class NoiseLoop:
+    """White noise from -`level` to `level` without an end: the same few seconds again and again, without a gap."""
+
+    def __init__(self, level: float) -> None:
+        import numpy as np  # noqa: PLC0415 - as above
+
+        drawn = np.random.default_rng(_SEED).uniform(-level, level, int(NOISE_ROUND_S * NOISE_RATE_Hz))
+        self._round, self._at = drawn.astype(np.float32)[:, None], 0
+
+    def block(self, frames: int) -> Any:
+        """The next samples (frames, 1), the same for both ears."""
+        places = range(self._at, self._at + frames)
+        self._at = places.stop % len(self._round)
+        return self._round.take(places, axis=0, mode="wrap")
 
 
 _REMEDY = "Connect headphones, see that the system lists them, then stop this run and resume it."
