@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
@@ -122,7 +122,7 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     >>> [round(x, 4) for x in wilson_interval(2, 10)]
     [0.0567, 0.5098]
     """
-    z = float(scipy.special.ndtri(0.975))
+    z = NormalDist().inv_cdf(0.975)
     share = successes / trials
     centre = share + z * z / (2.0 * trials)
     half = z * math.sqrt(share * (1.0 - share) / trials + z * z / (4.0 * trials * trials))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Literal, get_args
 
 import numpy as np
@@ -101,7 +102,7 @@ def paired_scores(
     fit, covariance = found
     basis = _basis(len(items))
     scores, ses = basis @ fit[: len(items) - 1], _errors(basis, covariance)
-    reach = float(scipy.special.ndtri((1 + level) / 2)) * ses
+    reach = NormalDist().inv_cdf((1 + level) / 2) * ses
     if len(wins_of) > 1:
         robust, robust_reach = _over_people(basis, covariance, _slopes(fit, wins_of, ties_of, model), level)
         ses, reach = np.maximum(ses, robust), np.maximum(reach, robust_reach)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Literal, cast, get_args
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from analysis.stats.arrays import FloatArray, Values, by_case, float_or_array, numbers, one_of, share, together
@@ -253,6 +253,6 @@ def wilson(k: FloatArray, n: FloatArray, tail: float) -> tuple[FloatArray, Float
     These are the roots of (n + z^2) p^2 - (2 k + z^2) p + k^2 / n = 0; the lower is taken from the product of the two,
     where nothing cancels. Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
     """
-    z = -float(scipy.special.ndtri(tail))
+    z = -NormalDist().inv_cdf(tail)
     upper = k + z * z / 2.0 + z * np.sqrt(k * (n - k) / n + z * z / 4.0)
     return k * (k / n) / upper, np.where(k == n, 1.0, upper / (n + z * z))

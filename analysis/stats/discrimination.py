@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,8 @@ CHANCE: Mapping[Task, float] = {"two-interval": 1 / 2, "abx": 1 / 2, "oddity": 1
 """How often who feels nothing is right."""
 MOST_D = 20.0
 """Beyond it, every task's share of right answers is 1 in floats."""
+_normal_quantiles = np.vectorize(NormalDist().inv_cdf, otypes=[np.float64])
+"""Of arrays. Of the standard library: a report that needs no more of scipy is spared importing it."""
 
 
 def _two_interval(d: FloatArray) -> FloatArray:
@@ -150,5 +153,5 @@ def _rate_and_z(counts: FloatArray, totals: FloatArray, name: str, of: str) -> t
     if (counts != np.floor(counts)).any() or (totals != np.floor(totals)).any():
         raise ValueError(f"{name} and {of} must be whole numbers, counts and not rates")
     rest = totals - counts
-    z = scipy.special.ndtri((np.minimum(counts, rest) + 0.5) / (totals + 1.0))
+    z = _normal_quantiles((np.minimum(counts, rest) + 0.5) / (totals + 1.0))
     return (counts + 0.5) / (totals + 1.0), np.where(counts > rest, -z, z)

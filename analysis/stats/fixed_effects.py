@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 import pandas as pd
@@ -103,7 +104,7 @@ def coefficients(
     names: Sequence[str], estimates: FloatArray, se: FloatArray, confidence: float
 ) -> Results[Coefficient]:
     """Wald tests and intervals of estimates (p,) with their standard errors (p,)."""
-    z, half = estimates / se, -float(scipy.special.ndtri((1.0 - confidence) / 2.0)) * se
+    z, half = estimates / se, -NormalDist().inv_cdf((1.0 - confidence) / 2.0) * se
     rows = by_row(
         estimate=estimates,
         se=se,

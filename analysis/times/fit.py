@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 import scipy
@@ -112,7 +113,7 @@ def fit(
     critical = -float(
         scipy.special.stdtrit(people - 1, BEYOND_INTERVAL / 2.0)
         if people
-        else scipy.special.ndtri(BEYOND_INTERVAL / 2.0)
+        else NormalDist().inv_cdf(BEYOND_INTERVAL / 2.0)
     )
     return DiffusionFit(
         estimates=_estimates(model, peak.at, np.sqrt(np.diag(covariance)), critical),

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.stats.arrays import FloatArray, numbers
@@ -296,7 +295,7 @@ def ez_people(
 def _solved(accuracy: FloatArray, mean_s: FloatArray, variance_s2: FloatArray, trials: FloatArray) -> FloatArray:
     """Drift, boundary, non-decision time and the accuracy used (4, cells), of variances above 0."""
     p = np.where((accuracy == 0.0) | (accuracy == 1.0), np.abs(accuracy - 0.5 / trials), accuracy)
-    L = scipy.special.logit(p)
+    L = 2.0 * np.arctanh(2.0 * p - 1.0)  # the log odds of p, good near 1/2 too
     boundary = (variance_s2 / (variance_form(L) - variance_form(L / 2.0) / 16.0)) ** 0.25
     non_decision_s = mean_s - boundary**2 * (mean_form(L) - mean_form(L / 2.0) / 4.0)
     return np.array([L / boundary, boundary, non_decision_s, p])

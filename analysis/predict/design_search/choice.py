@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from statistics import NormalDist
 
 import numpy as np
 import scipy
@@ -125,7 +126,7 @@ def summary_error(designs: Designs) -> Sequence[float]:
     return [float(x) for x in np.quantile(apart, [0.5, 0.95, 1.0])] if apart.size else []
 
 
-REACH = float(scipy.special.ndtri(0.975))
+REACH = NormalDist().inv_cdf(0.975)
 _STEP = 1e-4
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from statistics import NormalDist
 
 import numpy as np
 import scipy
@@ -262,7 +263,7 @@ def predicted_rate(
     with np.errstate(invalid="ignore"):
         slopes = np.array([_slope(partial(logit, name)) for name in FITTED])
     centre, se = float(logit("start", 1.0)), float(np.sqrt(slopes @ np.array(fit.covariance) @ slopes))
-    reach = -float(scipy.special.ndtri((1.0 - CONFIDENCE) / 2.0)) * se
+    reach = -NormalDist().inv_cdf((1.0 - CONFIDENCE) / 2.0) * se
     rate, low, high = (float(scipy.special.expit(x)) for x in (centre, centre - reach, centre + reach))
     return Fitted(value=rate, se=rate * (1.0 - rate) * se, ci_low=low, ci_high=high)
 
