@@ -186,6 +186,27 @@ assert not unused - {"matplotlib", "fontTools"} & set(sys.modules), "analyze"
 
 
 @pytest.mark.slow
+def test_a_report_of_one_participant_is_made_without_scipy_and_docstrings(tmp_path: Path) -> None:
+    recoil.run_synthetic(recoil.load_config("direction"), ["P01"], tmp_path, seed=1)
+    code = f"""
+import sys
+from pathlib import Path
+from recoil.cli import main
+sys.argv = ["recoil", "analyze", {str(tmp_path)!r}, "--out", {str(tmp_path / "out")!r}]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code
+from matplotlib.lines import Line2D
+assert "scipy.special" not in sys.modules
+assert "marker" not in Line2D.set.__doc__, "its lists of what can be set are made again"
+"""
+    done = subprocess.run([sys.executable, "-c", code + "print('seen')"], capture_output=True, text=True, check=False)
+    assert done.stdout.endswith("seen\n"), done.stderr
+    assert (tmp_path / "out" / "figures" / "figure-directions.pdf").is_file()
+
+
+@pytest.mark.slow
 def test_the_statistics_of_any_design_are_a_frame_and_a_table_in_a_notebook(tmp_path: Path) -> None:
     recoil.run_synthetic(recoil.load_config("realism"), ["P01", "P02", "P03"], tmp_path, seed=1)
     found = recoil.analyze(tmp_path)
