@@ -29,6 +29,7 @@ from experiments.record.journal import (
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.names import Place
+from experiments.record.owed_shot import shot_owed_since
 from experiments.record.replay import answers_in, history, is_shot, last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
@@ -381,7 +382,8 @@ def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
     """Whether the last that a participant had in their hand ended by an emergency stop, or the last on the gun.
 
     Practices and runs set aside are such too, and so is a run that began with the same debt and ended before it was
-    paid. What is done next begins with a test shot, then. `before`: what their own journal holds, where they go on.
+    paid, and a test shot beside all runs. What is done next begins with a test shot, then. `before`: what their own
+    journal holds, where they go on.
     """
     own = [] if before is None else [before]
     for path in where.folder.glob("*_journal*.jsonl"):
@@ -393,7 +395,9 @@ def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
 
 
 def _words_on(gun: str, where: Place, before: Contents | None) -> Iterator[tuple[str, bool]]:
-    """The last word on a gun of each run that had it: a stop may have been for a fault of the gun's."""
+    """The last word on a gun of each run that had it, and of test shots: a stop may have been for the gun's fault."""
+    if owed := shot_owed_since(where.results):
+        yield owed, True
     if before is not None:
         yield last_word_on_gun(before, gun)
     serials, found = _serials(gun), 0

@@ -19,6 +19,7 @@ from experiments.design.plan import Trial
 from experiments.live_run import CORRECTION_UNSAVED, EventVerdict, RunStopped
 from experiments.record import storage
 from experiments.record.journal import JournalError
+from experiments.record.owed_shot import owe_shot
 from experiments.record.replay import history
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_question
 from experiments.screens.texts import again_text
@@ -1286,6 +1287,22 @@ def test_the_next_participant_on_the_same_gun_begins_with_a_test_shot(
         assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * owed
     (tmp_path / "sub-P01").rename(tmp_path / "sub-P03")
     with sat(DIRECTION, tmp_path) as sitting:  # a test shot was made, or another gun was used
+        assert sitting.position.base in (S.SETTING, S.PREPARING)
+
+
+@pytest.mark.parametrize(("gun", "owed"), [("7", True), ("simulated", False)])
+def test_a_run_pays_the_test_shot_that_one_beside_all_runs_left_owed(
+    gun: str, owed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    identity = Identity(model="simulated" if gun == "simulated" else "shaker", version="2", serial=gun)
+    monkeypatch.setattr(WatchedGun, "identify", lambda _: identity, raising=False)
+    owe_shot(tmp_path, "serial:/dev/gun", "2000-01-01T00:00:00.000+00:00")
+    with sat(DIRECTION, tmp_path) as sitting:
+        assert (sitting.state is S.REARMING) is owed
+        sitting.to(S.PREPARING)
+        assert [one.text for one in remarks(of_journal(sitting), Noted)] == [HALTED_BEFORE] * owed
+    (tmp_path / "sub-P01").rename(tmp_path / "sub-P02")
+    with sat(DIRECTION, tmp_path) as sitting:  # the journal of the first has a test shot since
         assert sitting.position.base in (S.SETTING, S.PREPARING)
 
 

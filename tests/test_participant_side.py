@@ -18,7 +18,8 @@ from experiments.catalogues.messages import ENGLISH_MESSAGES, ParticipantMessage
 from experiments.design import planning
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
-from experiments.screens.console.participant_link import PAUSED, ParticipantSide
+from experiments.run_request import RunRequest
+from experiments.screens.console.participant_link import PAUSED, ParticipantSide, look_of
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.messages import (
@@ -359,3 +360,19 @@ def test_a_question_whose_time_is_over_before_it_is_asked_is_never_shown(told: T
     wait_for(lambda: not any(thread.name == "participant" for thread in threading.enumerate()))
     shown = told.end()
     assert shown[-2:] == ["Paused. Please wait.", "end"]
+
+
+@pytest.mark.parametrize(
+    ("rooms", "seen"),
+    [
+        ([(1920, 1040)], (0, False, 1280, 800)),
+        ([(1024, 600)], (0, False, 1024, 560)),
+        ([(1920, 1080), (1024, 768)], (1, True, 1024, 728)),
+    ],
+)
+def test_of_one_screen_their_window_takes_no_more_than_there_is(
+    rooms: list[tuple[int, int]], seen: tuple[int, bool, int, int]
+) -> None:
+    request = RunRequest(setup=load_setup("preference"), participant_id="P01", results=Path("none"), screen="console")
+    look = look_of(request, rooms)
+    assert (look.screen, look.full_screen, look.width_px, look.height_px) == seen

@@ -27,6 +27,7 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
+from experiments.record.owed_shot import owe_shot, shot_owed_since
 from experiments.run import run
 from experiments.run_request import ParticipantOptions, RunRequest
 from experiments.screens.console import live, widgets
@@ -320,6 +321,28 @@ def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_fir
     live.lab_day(request, (), lambda *_: nullcontext())
     assert "P01 stopped: emergency stop practised." in told[1]
     assert told[1].endswith("begins with a test shot, and so does the next run on that gun.") is halted
+
+
+@pytest.mark.parametrize("emptied", [True, False])
+def test_nobody_begins_anew_where_the_results_folder_is_gone(emptied: bool, opened: Open, study: StudyFolder) -> None:
+    do(study, "P01", records=20)
+    window = opened()
+    fill(window, "P01")
+    study.results.rename(away := study.results.with_name("away"))
+    if emptied:  # as where a disk was mounted
+        study.results.mkdir()
+    for _ in range(2):
+        key(window, "Return", CTRL)
+        assert window.choice is None
+        assert "all who were in it are gone (1)" in said(window)
+        key(window, "P", CTRL)
+        assert window.choice is None
+    assert not list(study.results.glob("*"))
+    if emptied:
+        study.results.rmdir()
+    away.rename(study.results)
+    key(window, "Return", CTRL)
+    assert "Go on there, or set it aside" in question(window)
 
 
 def test_f12_is_said_to_be_heard_where_nothing_is_armed(opened: Open) -> None:
@@ -953,6 +976,39 @@ def test_after_an_emergency_stop_of_a_test_shot_nothing_begins_before_one_was_fi
     if begins == "Return":
         key(window, "S", CTRL)  # simulated, all the same
     assert window.choice is not None
+
+
+def test_a_test_shot_that_an_emergency_stop_left_owed_is_owed_in_later_windows_too(
+    opened: Open, study: StudyFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.twins import a_twin
+
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
+    with a_twin(tmp_path, speed=1.0) as (_, socket):
+        gun = f"serial:{socket.address}"
+        first = opened(gun=gun)
+        key(first, "T", CTRL)
+        until(lambda: first.shots.count.text() != "")
+        key(first, "F12")
+        until(lambda: not first.shots.is_running and shot_owed_since(study.results) != "")
+        first.close()
+        window = opened(gun=gun)
+        assert said(window) == "The last test shot ended by an emergency stop."
+        fill(window, "P01")
+        key(window, "Return", CTRL)
+        assert window.choice is None
+        assert "A test shot comes first" in question(window)
+        key(window, "S", CTRL)
+        until(lambda: not window.shots.is_running)
+        assert window.shots.title.text() == "Fired"
+    assert shot_owed_since(study.results) == ""
+    assert not opened(gun=gun).shots.owed
+
+
+def test_a_simulated_gun_owes_nothing(opened: Open, study: StudyFolder) -> None:
+    owe_shot(study.results, SERIAL, "2026-01-01T00:00:00.000+00:00")
+    assert not opened(gun="simulated").shots.owed
+    assert opened().shots.owed
 
 
 def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> None:

@@ -192,6 +192,12 @@ def study_of(request: RunRequest) -> StudyFolder:
     return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
+def rooms_px() -> list[tuple[int, int]]:
+    """The width and height that a window may have on each screen."""
+    rooms = [screen.availableSize() * screen.devicePixelRatio() for screen in QGuiApplication.screens()]
+    return [(room.width(), room.height()) for room in rooms]
+
+
 def _participant(stack: ExitStack, request: RunRequest, emergency: Callable[[], None]) -> ParticipantSide:
     """The participant's screen, once it is open: PsychoPy takes its time, and a window says so meanwhile.
 
@@ -202,7 +208,7 @@ def _participant(stack: ExitStack, request: RunRequest, emergency: Callable[[], 
     check_monitor(options.monitor)
     if options.keys:
         check_own_keys(setup, rates=options.screen)
-    look = look_of(request, len(QGuiApplication.screens()))
+    look = look_of(request, rooms_px())
 
     def open_link() -> ParticipantLink:
         link = stack.enter_context(ParticipantLink.start(look))

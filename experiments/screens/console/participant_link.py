@@ -81,16 +81,24 @@ def check_font(request: RunRequest) -> None:
         font_for(request.language, letters_of(request.language, request.setup))
 
 
-def look_of(request: RunRequest, screens: int) -> messages.Look:
+_TITLE_BAR_PX = 40
+
+
+def look_of(request: RunRequest, rooms_px: Sequence[tuple[int, int]]) -> messages.Look:
     """The screen that was chosen, else the last of several, all of it; of one screen a part, to leave the console.
 
-    In a font that has all letters of the participant's language. `ConfigError`: there is none.
+    `rooms_px`: the width and height of each screen that a window may have. In a font that has all letters of the
+    participant's language. `ConfigError`: there is none.
     """
     monitor, language = request.options.monitor, request.language
     font = font_for(language, letters_of(language, request.setup))
+    screen = len(rooms_px) - 1 if monitor is None else monitor
+    (width_px, height_px), usual = rooms_px[screen], messages.Look()
     return messages.Look(
-        screen=screens - 1 if monitor is None else monitor,
-        full_screen=screens > 1,
+        screen=screen,
+        full_screen=len(rooms_px) > 1,
+        width_px=min(width_px, usual.width_px),
+        height_px=min(height_px - _TITLE_BAR_PX, usual.height_px),
         font=font.family,
         font_file=str(font.path or ""),
         right_to_left=language.right_to_left,

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from PyQt6.QtCore import Qt, pyqtSignal
@@ -21,6 +22,8 @@ from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
+from experiments.record.owed_shot import no_shot_is_owed, owe_shot, shot_owed_since
+from experiments.record.tables import is_simulated
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
 from experiments.screens.console.widgets import TextLines
@@ -200,14 +203,15 @@ class ShotPage(QWidget):
     told = pyqtSignal(object)
     left = pyqtSignal()
 
-    def __init__(self, gun: str, clock: Clock) -> None:
+    def __init__(self, gun: str, results: Path, clock: Clock) -> None:
         super().__init__()
-        self._gun, self._clock = gun, clock
+        self._gun, self._results, self._clock = gun, results, clock
         self._check: ShotCheck | None = None
         self._setup: Setup[DesignConfig] | None = None
-        self.stopped = self.owed = False
-        """The emergency stop: nothing is fired from this page until it was left, and entered on purpose; and a test
-        shot is owed until one was fired."""
+        self.stopped = False
+        """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
+        self.owed = not is_simulated(gun) and shot_owed_since(results) != ""
+        """After an emergency stop, also of an earlier window, until a test shot was fired."""
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
         self.told.connect(self._take)
@@ -276,11 +280,23 @@ class ShotPage(QWidget):
             return
         self._check.emergency_stop()
         self.stopped = self.owed = True
+        if not is_simulated(self._gun):
+            threading.Thread(target=self._owe, name="owed").start()  # a disk may take its time
         self._show(
             phrase("EMERGENCY STOP"),
             DISARMING,
             "bad",
         )
+
+    def _owe(self) -> None:
+        with suppress(OSError):  # this window knows of it all the same
+            owe_shot(self._results, self._gun, self._clock.utc())
+
+    def _settle(self) -> None:
+        """What was owed is fired."""
+        if not self.owed:
+            with suppress(OSError):  # one test shot more is asked for then
+                no_shot_is_owed(self._results)
 
     def call_off(self) -> None:
         """Fire no more, if it has not fired."""
@@ -314,6 +330,7 @@ class ShotPage(QWidget):
         if told.fired:
             self._method_at += 1
             self.owed = self.stopped
+            self._settle()
         title = phrase("EMERGENCY STOP") if self.stopped else phrase("Fired") if told.fired else phrase("Not fired")
         self._show(title, told.text, told.mood)
         self._running(False)

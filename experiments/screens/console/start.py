@@ -24,7 +24,8 @@ from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, Question
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
-from experiments.study.folders import Overview, PlaceError, StudyFolder, overview, read_anew
+from experiments.study.folders import Overview, PlaceError, StudyFolder, known_codes, overview, read_anew
+from experiments.study.register import read_register
 from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
@@ -45,6 +46,8 @@ class StartWindow(QtWidgets.QWidget):
         self.choice: RunRequest | None = None
         self.question: QuestionBox | None = None
         self._simulation_is_known = False
+        self._had: set[str] = set()
+        """Whoever was seen in the results folder."""
         self._closing = self._was_left = False
         self._scale = 0.0
         self._build()
@@ -57,7 +60,7 @@ class StartWindow(QtWidgets.QWidget):
     def _build(self) -> None:
         self.setWindowTitle("Recoil – start")
         self.form = Form(self._study.experiments, self._study.config.eligibility.ask, self._opening)
-        self.shots = ShotPage(self._opening.gun, self._clock)
+        self.shots = ShotPage(self._opening.gun, self._study.results, self._clock)
         self.table = PeopleTable(self._study.experiments)
         self.next, self.saved = TextLines("detail"), TextLines("saved", most_lines=5)
         self.pages = QtWidgets.QStackedWidget()
@@ -120,11 +123,16 @@ class StartWindow(QtWidgets.QWidget):
             unread += str(error).splitlines()
         seen = overview(self._study)
         self._seen: Overview = replace(seen, problems=tuple(dict.fromkeys([*unread, *seen.problems])))
+        self._had.update(one.participant_id for one in self._seen.participants)
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
 
     def _read_anew(self) -> None:
-        """Have the study as its files are now. `ConfigError`; `PlaceError`, if this window's fields are another's."""
+        """Have the study as its files are now.
+
+        `ConfigError`; `PlaceError`, if this window's fields are another's, or all who were in the results folder are
+        gone: who went on there would begin anew.
+        """
         before, now = self._study, read_anew(self._study)
         fields = [(one.experiments, one.config.experiments, one.config.eligibility.ask) for one in (before, now)]
         if fields[0] != fields[1]:
@@ -135,13 +143,23 @@ class StartWindow(QtWidgets.QWidget):
                     source=before.source,
                 )
             )
-        self._study = now
+        self._study, results = now, now.results
+        if self._had and not known_codes(results, read_register(results)):
+            raise PlaceError(
+                phrase(
+                    "{results}: all who were in it are gone ({count}): it was moved, or its disk is away. Put it back; "
+                    "or quit, and start Recoil again, to begin with nobody",
+                    results=results.resolve(),
+                    count=len(self._had),
+                )
+            )
 
     def _say_first(self, opening: Opening) -> None:
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
         code, experiment = entered.participant_id, entered.experiment
         named = people.named_text(opening.named, code, self._person(code), experiment)
-        told = filter(None, [named, people.changed_text(self._seen)])
+        owed = STOPPED if self.shots.owed else ""
+        told = filter(None, [owed, named, people.changed_text(self._seen)])
         self.say("\n".join([*bad, *told]), "bad" if bad else "ask")
 
     def _propose(self, participant_id: str) -> None:
