@@ -10,16 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.screens.participant.noise import NOISE_ROUND_S, NOISE_RATE_Hz, NoiseLoop
+from experiments.screens.participant.noise import NOISE_ROUND, NoiseLoop
 from tests.waiting import wait_for
-
-ROUND = int(NOISE_ROUND_S * NOISE_RATE_Hz)
 
 
 @pytest.mark.parametrize("frames", [1, 64, 441, 1000])
 def test_blocks_of_any_length_join_without_a_gap_from_round_to_round(frames: int) -> None:
-    loop, whole = NoiseLoop(0.5), NoiseLoop(0.5).block(ROUND)
-    count = (ROUND + 5000) // frames if frames > 1 else 10
+    loop, whole = NoiseLoop(0.5), NoiseLoop(0.5).block(NOISE_ROUND)
+    count = (NOISE_ROUND + 5000) // frames if frames > 1 else 10
     joined = np.concatenate([loop.block(frames) for _ in range(count)])
     assert np.array_equal(joined, np.resize(whole, joined.shape))
     assert 0.49 < np.abs(whole).max() <= 0.5
@@ -51,7 +49,7 @@ def test_a_device_is_given_noise_for_longer_than_one_round(tmp_path: Path) -> No
         if program.stdout.readline() != "plays\n":
             pytest.skip("the sound library does not take its devices from ALSA")
         frame_bytes = 2 * np.dtype(np.float32).itemsize
-        enough = int(1.3 * ROUND) * frame_bytes
+        enough = int(1.3 * NOISE_ROUND) * frame_bytes
         wait_for(lambda: played.exists() and played.stat().st_size > enough, "it is not played on", look_s=0.1)
     finally:
         program.stdin.close()

@@ -10,8 +10,8 @@ from typing import Any
 
 from experiments.screens.participant import messages
 
-NOISE_ROUND_S = 10.0
-NOISE_RATE_Hz = 44_100
+NOISE_ROUND = 441_000
+"""Samples until it begins again: some ten seconds, by the rate that the device has."""
 _SEED = 20_240  # assumed; any will do, and the same noise for everybody
 
 
@@ -62,7 +62,7 @@ def _playing(level: float) -> Any:
     def fill(out: Any, frames: int, *_: object) -> None:
         out[:] = noise.block(frames)
 
-    stream = OutputStream(samplerate=NOISE_RATE_Hz, channels=2, dtype="float32", callback=fill)
+    stream = OutputStream(channels=2, dtype="float32", callback=fill)
     stream.start()
     return stream
 
@@ -73,7 +73,7 @@ class NoiseLoop:
     def __init__(self, level: float) -> None:
         import numpy as np  # noqa: PLC0415 - as above
 
-        drawn = np.random.default_rng(_SEED).uniform(-level, level, int(NOISE_ROUND_S * NOISE_RATE_Hz))
+        drawn = np.random.default_rng(_SEED).uniform(-level, level, NOISE_ROUND)
         self._round, self._at = drawn.astype(np.float32)[:, None], 0
 
     def block(self, frames: int) -> Any:
