@@ -29,7 +29,7 @@ from experiments.record.journal import (
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.names import Place
-from experiments.record.owed_shot import shot_owed_since
+from experiments.record.owed_shot import owed_shots
 from experiments.record.replay import answers_in, history, is_shot, last_word_on_gun
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest
@@ -391,19 +391,28 @@ def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
             own += [] if path == where.journal else [read_journal(path)]
     if max(map(last_word_on_gun, own), default=("", False))[1]:
         return True
-    return not is_simulated(gun) and max(_words_on(gun, where, before), default=("", False))[1]
+    if is_simulated(gun):
+        return False
+    words = [
+        *_words_on(gun, where.results, where.journal),
+        *([] if before is None else [last_word_on_gun(before, gun)]),
+    ]
+    return max(words, default=("", False))[1]
 
 
-def _words_on(gun: str, where: Place, before: Contents | None) -> Iterator[tuple[str, bool]]:
+def owes_shot(results: Path, address: str) -> bool:
+    """Whether an emergency stop beside all runs left a gun at an address a test shot that it still owes."""
+    owed = [one for one in owed_shots(results) if one.address in ("", address)]
+    return any(not one.gun or max(_words_on(one.gun, results))[1] for one in owed)
+
+
+def _words_on(gun: str, results: Path, own: Path | None = None) -> Iterator[tuple[str, bool]]:
     """The last word on a gun of each run that had it, and of test shots: a stop may have been for the gun's fault."""
-    if owed := shot_owed_since(where.results):
-        yield owed, True
-    if before is not None:
-        yield last_word_on_gun(before, gun)
+    yield from ((one.utc, True) for one in owed_shots(results) if one.gun in ("", gun))
     serials, found = _serials(gun), 0
-    for path in nlargest(LOOKED_BACK, where.results.glob("sub-*/*_journal*.jsonl"), key=_written_ns):
+    for path in nlargest(LOOKED_BACK, results.glob("sub-*/*_journal*.jsonl"), key=_written_ns):
         with suppress(JournalError):
-            if path != where.journal and any(map(journal_bytes(path).__contains__, serials)):
+            if path != own and any(map(journal_bytes(path).__contains__, serials)):
                 yield last_word_on_gun(read_journal(path), gun)
                 found += 1
         if found == _OF_GUN:

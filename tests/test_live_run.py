@@ -16,10 +16,11 @@ from device.serial_gun.triggering import ARM_WITHIN_S
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Trial
+from experiments.earlier_run import owes_shot
 from experiments.live_run import CORRECTION_UNSAVED, EventVerdict, RunStopped
 from experiments.record import storage
 from experiments.record.journal import JournalError
-from experiments.record.owed_shot import owe_shot
+from experiments.record.owed_shot import OwedShot, owe_shot
 from experiments.record.replay import history
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_question
 from experiments.screens.texts import again_text
@@ -1290,13 +1291,19 @@ def test_the_next_participant_on_the_same_gun_begins_with_a_test_shot(
         assert sitting.position.base in (S.SETTING, S.PREPARING)
 
 
-@pytest.mark.parametrize(("gun", "owed"), [("7", True), ("simulated", False)])
+@pytest.mark.parametrize("by_name", [True, False])
+@pytest.mark.parametrize(("gun", "owed"), [("7", True), ("9", False), ("simulated", False)])
 def test_a_run_pays_the_test_shot_that_one_beside_all_runs_left_owed(
-    gun: str, owed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gun: str, owed: bool, by_name: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     identity = Identity(model="simulated" if gun == "simulated" else "shaker", version="2", serial=gun)
     monkeypatch.setattr(WatchedGun, "identify", lambda _: identity, raising=False)
-    owe_shot(tmp_path, "serial:/dev/gun", "2000-01-01T00:00:00.000+00:00")
+    for number in ("8", "7" if by_name else ""):  # the first is another gun's
+        name = number and f"shaker:{number}"
+        owe_shot(
+            tmp_path, OwedShot(utc="2000-01-01T00:00:00.000+00:00", gun=name, address=f"serial:/dev/{number or 7}")
+        )
+    owed = owed or (gun == "9" and not by_name)  # whose it is nobody knows
     with sat(DIRECTION, tmp_path) as sitting:
         assert (sitting.state is S.REARMING) is owed
         sitting.to(S.PREPARING)
@@ -1304,6 +1311,8 @@ def test_a_run_pays_the_test_shot_that_one_beside_all_runs_left_owed(
     (tmp_path / "sub-P01").rename(tmp_path / "sub-P02")
     with sat(DIRECTION, tmp_path) as sitting:  # the journal of the first has a test shot since
         assert sitting.position.base in (S.SETTING, S.PREPARING)
+    assert owes_shot(tmp_path, "serial:/dev/7") is not (gun == "7" and by_name)  # that was paid
+    assert owes_shot(tmp_path, "serial:/dev/8")
 
 
 def test_a_gun_owes_its_test_shot_until_that_is_fired_on_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

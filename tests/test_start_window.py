@@ -27,7 +27,7 @@ from experiments.clock import RealClock, VirtualClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
 from experiments.record.journal import hold_journal
-from experiments.record.owed_shot import owe_shot, shot_owed_since
+from experiments.record.owed_shot import OWED_FILE, OwedShot, owe_shot, owed_shots, shot_was_fired
 from experiments.run import run
 from experiments.run_request import ParticipantOptions, RunRequest
 from experiments.screens.console import live, widgets
@@ -343,6 +343,24 @@ def test_nobody_begins_anew_where_the_results_folder_is_gone(emptied: bool, open
     away.rename(study.results)
     key(window, "Return", CTRL)
     assert "Go on there, or set it aside" in question(window)
+
+
+def test_nobody_begins_anew_either_where_the_results_folder_went_while_they_ran(
+    opened: Open, study: StudyFolder
+) -> None:
+    opening: dict[str, Any] = {"had": set()}
+    window = opened(**opening)
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert window.choice is not None
+    do(study, "P01", records=20)
+    study.results.rename(study.results.with_name("away"))
+    window = opened(**opening)
+    assert "all who were in it are gone (1)" in said(window)
+    fill(window, "P02")
+    key(window, "Return", CTRL)
+    assert window.choice is None
+    assert not study.results.exists()
 
 
 def test_f12_is_said_to_be_heard_where_nothing_is_armed(opened: Open) -> None:
@@ -990,7 +1008,7 @@ def test_a_test_shot_that_an_emergency_stop_left_owed_is_owed_in_later_windows_t
         key(first, "T", CTRL)
         until(lambda: first.shots.count.text() != "")
         key(first, "F12")
-        until(lambda: not first.shots.is_running and shot_owed_since(study.results) != "")
+        until(lambda: not first.shots.is_running and len(owed_shots(study.results)) == 1)
         first.close()
         window = opened(gun=gun)
         assert said(window) == "The last test shot ended by an emergency stop."
@@ -1001,14 +1019,94 @@ def test_a_test_shot_that_an_emergency_stop_left_owed_is_owed_in_later_windows_t
         key(window, "S", CTRL)
         until(lambda: not window.shots.is_running)
         assert window.shots.title.text() == "Fired"
-    assert shot_owed_since(study.results) == ""
+    assert not owed_shots(study.results)
     assert not opened(gun=gun).shots.owed
 
 
 def test_a_simulated_gun_owes_nothing(opened: Open, study: StudyFolder) -> None:
-    owe_shot(study.results, SERIAL, "2026-01-01T00:00:00.000+00:00")
+    owe_shot(study.results, OwedShot(utc="2026-01-01T00:00:00.000+00:00", gun="", address=SERIAL))
     assert not opened(gun="simulated").shots.owed
+    assert not opened(gun="serial:/dev/other").shots.owed
     assert opened().shots.owed
+
+
+@pytest.mark.parametrize(
+    "rubbish", [b"", b"\n", b" ", b"gone", b"[]", b'{"utc": 1}', b'{"utc": 1, "gun": "", "address": ""}', b"\xff\n"]
+)
+def test_a_file_of_owed_test_shots_that_nobody_can_read_owes_one(
+    rubbish: bytes, opened: Open, study: StudyFolder
+) -> None:
+    study.results.mkdir(exist_ok=True)
+    (study.results / OWED_FILE).write_bytes(rubbish)
+    assert opened().shots.owed
+    shot_was_fired(study.results, "shaker:7", SERIAL)
+    assert not owed_shots(study.results)
+
+
+def test_a_test_shot_pays_what_its_own_gun_owes(study: StudyFolder) -> None:
+    guns = [
+        ("", "serial:auto"),
+        ("shaker:7", "serial:auto"),
+        ("shaker:7", "serial:other"),
+        ("shaker:8", SERIAL),
+        ("", SERIAL),
+    ]
+    for gun, address in guns:
+        owe_shot(study.results, OwedShot(utc="2026-01-01T00:00:00.000+00:00", gun=gun, address=address))
+    shot_was_fired(study.results, "shaker:7", "serial:auto")
+    assert [(one.gun, one.address) for one in owed_shots(study.results)] == guns[3:]
+
+
+@pytest.mark.parametrize("away", [True, False])
+def test_it_is_said_where_the_disk_does_not_keep_that_a_test_shot_is_owed(
+    away: bool, opened: Open, study: StudyFolder, tmp_path: Path
+) -> None:
+    from tests.twins import a_twin
+
+    study.results.mkdir(exist_ok=True)
+    with a_twin(tmp_path, speed=1.0) as (_, socket):
+        window = opened(gun=f"serial:{socket.address}")
+        key(window, "T", CTRL)
+        until(lambda: window.shots.count.text() != "")
+        if away:
+            study.results.rename(study.results.with_name("away"))
+        else:
+            (study.results / OWED_FILE).mkdir()
+        key(window, "F12")
+        until(lambda: not window.shots.is_running)
+        unkept = "does not keep that a test shot is owed"
+        until(lambda: window.shots.detail.toPlainText().count(unkept) == 1)
+        assert "The gun reports: disarmed." in window.shots.detail.toPlainText()
+    assert not (away and study.results.exists())
+
+
+def test_an_emergency_stop_behind_a_test_shot_counts(
+    opened: Open, study: StudyFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.twins import a_twin
+
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 0)
+    with a_twin(tmp_path, speed=1.0) as (_, socket):
+        window = opened(gun=f"serial:{socket.address}")
+        key(window, "T", CTRL)
+        until(lambda: not window.shots.is_running)
+        fired = window.shots.detail.toPlainText()
+        for _ in range(2):
+            key(window, "F12")
+        until(lambda: len(owed_shots(study.results)) == 1)
+        assert window.shots.title.text() == "EMERGENCY STOP"
+        assert window.shots.detail.toPlainText().startswith(f"{fired} That was over when you stopped it")
+        key(window, "T", CTRL)
+        assert not window.shots.is_running
+        (owed,) = owed_shots(study.results)
+        assert owed.gun
+        key(window, "Escape")
+        key(window, "R", CTRL)
+        assert window.choice is None
+        assert "A test shot comes first" in question(window)
+        key(window, "S", CTRL)
+        until(lambda: not window.shots.is_running)
+    assert not owed_shots(study.results)
 
 
 def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> None:

@@ -1,33 +1,65 @@
-"""The test shot that an emergency stop in another test shot leaves owed: a file of the results folder says so.
+"""Test shots that an emergency stop in another test shot leaves owed: a file of the results folder has a line for each.
 
 It is there until a test shot was fired beside all runs. One that was fired in a run stands in its journal.
 """
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from experiments.record import storage
 
-OWED_FILE = "test-shot-owed.txt"
+OWED_FILE = "test-shots-owed.jsonl"
 
 
-def owe_shot(results: Path, gun: str, utc: str) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwedShot:
+    """When the stop was, on which gun, by its name and by the address that it was opened at; "" if nobody knows."""
+
+    utc: str
+    gun: str
+    address: str
+
+
+_UNREAD = OwedShot(utc="9999", gun="", address="")
+"""A line that says nothing: whose it is nobody knows, so every gun owes it."""
+
+
+def owe_shot(results: Path, owed: OwedShot) -> None:
     """Have it on the disk. `OSError`, if that does not take it."""
     storage.make_folder(results)
-    said = f"{utc} A test shot on {gun} ended by an emergency stop. Whatever comes next begins with a test shot.\n"
-    storage.write_whole(results / OWED_FILE, said.encode())
+    _write(results, [*owed_shots(results), owed])
 
 
-def shot_owed_since(results: Path) -> str:
-    """The date and time of the stop; empty if nothing is owed."""
+def owed_shots(results: Path) -> list[OwedShot]:
+    """All that are owed."""
     try:
-        said = storage.read_whole(results / OWED_FILE)
+        data = storage.read_whole(results / OWED_FILE)
     except (FileNotFoundError, NotADirectoryError):
-        return ""
-    return said.decode(errors="replace").partition(" ")[0]
+        return []
+    return [_of_line(line) for line in data.splitlines() or [data]]
 
 
-def no_shot_is_owed(results: Path) -> None:
-    """A test shot was fired. `OSError`, if the disk keeps the file."""
-    (results / OWED_FILE).unlink(missing_ok=True)
+def _of_line(line: bytes) -> OwedShot:
+    try:
+        values = json.loads(line)
+        return OwedShot(**{name: str(value) for name, value in values.items()})
+    except (ValueError, TypeError, AttributeError):
+        return _UNREAD
+
+
+def shot_was_fired(results: Path, gun: str, address: str) -> None:
+    """A test shot was fired on a gun: it owes none any more. `OSError`, if the disk does not take that."""
+    owed = owed_shots(results)
+    others = [one for one in owed if one.gun != gun and one.address not in ("", address)]
+    if others:
+        _write(results, others)
+    elif owed:
+        (results / OWED_FILE).unlink()
+
+
+def _write(results: Path, owed: list[OwedShot]) -> None:
+    lines = [json.dumps(asdict(one), ensure_ascii=False) for one in owed]
+    storage.write_whole(results / OWED_FILE, "".join(f"{line}\n" for line in lines).encode())

@@ -192,7 +192,8 @@ class Opening:
     """How a start window opens: on which gun, with what ticked, with whom (empty: who comes next), and what it says.
 
     `named` is the experiment whose config was named when the program was started; later windows have none.
-    `language` is the code of one of the `languages`; `sensor` and `markers` are as of a `RunRequest`.
+    `language` is the code of one of the `languages`; `sensor` and `markers` are as of a `RunRequest`. `had` grows from
+    window to window by whoever was seen in the results folder.
     """
 
     gun: str
@@ -204,6 +205,7 @@ class Opening:
     markers: bool = False
     participant_id: str = ""
     said: str = ""
+    had: set[str] = field(default_factory=set)
 
 
 class PeopleTable(QtWidgets.QTableWidget):

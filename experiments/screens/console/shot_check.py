@@ -6,10 +6,12 @@ before it fires, so that nothing of this test fires after it, whatever the gun d
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from errno import ENOENT
 from pathlib import Path
 from typing import Literal
 
@@ -22,7 +24,8 @@ from device.words import Drive, Effect
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
-from experiments.record.owed_shot import no_shot_is_owed, owe_shot, shot_owed_since
+from experiments.earlier_run import owes_shot
+from experiments.record.owed_shot import OwedShot, owe_shot, shot_was_fired
 from experiments.record.tables import is_simulated
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
@@ -60,6 +63,8 @@ class ShotCheck:
         self._clock, self._tell = clock, tell
         self._latched, self._off = threading.Event(), threading.Event()
         self._gun: Gun | None = None
+        self.gun_name = ""
+        """Known once it was opened."""
         self._report: ShotReport | None = None
         self.disarming: list[threading.Thread] = []
 
@@ -105,7 +110,7 @@ class ShotCheck:
         methods = self._setup.gun.renderings(self._setup.config.methods)
         drive = drive_of(methods[self._method])
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
-            self._gun = gun
+            self._gun, self.gun_name = gun, gun.identify().name
             try:
                 outcome, mood = self._fire(gun, drive), "good"
             except (DeviceError, ValueError) as error:
@@ -202,6 +207,7 @@ class ShotPage(QWidget):
 
     told = pyqtSignal(object)
     left = pyqtSignal()
+    unkept = pyqtSignal(str)
 
     def __init__(self, gun: str, results: Path, clock: Clock) -> None:
         super().__init__()
@@ -210,11 +216,14 @@ class ShotPage(QWidget):
         self._setup: Setup[DesignConfig] | None = None
         self.stopped = False
         """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
-        self.owed = not is_simulated(gun) and shot_owed_since(results) != ""
+        self.owed = not is_simulated(gun) and owes_shot(results, gun)
         """After an emergency stop, also of an earlier window, until a test shot was fired."""
+        self._gun_name, self._had_results = "", results.is_dir()
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
+        self._unkept = ""
         self.told.connect(self._take)
+        self.unkept.connect(self._say_unkept)
         self._build()
 
     def _build(self) -> None:
@@ -275,28 +284,45 @@ class ShotPage(QWidget):
         self._check.start()
 
     def emergency_stop(self) -> None:
-        """Latch and disarm."""
-        if self._check is None:
+        """Latch and disarm; also behind a shot, which the stop may be for."""
+        if self.stopped and not self.is_running:
             return
-        self._check.emergency_stop()
+        if self._check is not None:
+            self._check.emergency_stop()
+            self._gun_name = self._check.gun_name
         self.stopped = self.owed = True
+        self._unkept = ""
         if not is_simulated(self._gun):
             threading.Thread(target=self._owe, name="owed").start()  # a disk may take its time
-        self._show(
-            phrase("EMERGENCY STOP"),
-            DISARMING,
-            "bad",
+        over = phrase(
+            "{outcome} That was over when you stopped it: a test shot comes first, whatever is done next.",
+            outcome=self.detail.toPlainText(),
         )
+        self._show(phrase("EMERGENCY STOP"), DISARMING if self.is_running else over, "bad")
+        self._running(self.is_running)
 
     def _owe(self) -> None:
-        with suppress(OSError):  # this window knows of it all the same
-            owe_shot(self._results, self._gun, self._clock.utc())
+        try:
+            if self._had_results and not self._results.is_dir():  # a new one would be in its way back
+                raise FileNotFoundError(ENOENT, os.strerror(ENOENT))
+            owe_shot(self._results, OwedShot(utc=self._clock.utc(), gun=self._gun_name, address=self._gun))
+        except OSError as error:
+            self.unkept.emit(error.strerror or str(error))
+
+    def _say_unkept(self, why: str) -> None:
+        """The stop is not on the disk: only this window knows of it."""
+        self._unkept = phrase(
+            "{results} does not keep that a test shot is owed ({why}): fire it before you close this window.",
+            results=self._results.resolve(),
+            why=why,
+        )
+        self.detail.say(f"{self.detail.toPlainText()} {self._unkept}", "bad")
 
     def _settle(self) -> None:
         """What was owed is fired."""
         if not self.owed:
             with suppress(OSError):  # one test shot more is asked for then
-                no_shot_is_owed(self._results)
+                shot_was_fired(self._results, self._gun_name, self._gun)
 
     def call_off(self) -> None:
         """Fire no more, if it has not fired."""
@@ -326,6 +352,8 @@ class ShotPage(QWidget):
             self._show(phrase("Firing"), self._shown, "wait")
 
     def _end(self, told: ShotProgress) -> None:
+        if self._check is not None:
+            self._gun_name = self._check.gun_name
         self._check = None
         if told.fired:
             self._method_at += 1
@@ -339,11 +367,10 @@ class ShotPage(QWidget):
     def _show(self, title: str, detail: str, mood: str) -> None:
         self.title.setText(title)
         widgets.set_mood(self.title, mood)
-        self.detail.say(detail, mood)
+        self.detail.say(" ".join(filter(None, [detail, self._unkept if self.owed else ""])), mood)
         self.count.setText("")
 
     def _running(self, running: bool) -> None:
-        self.stop_button.setVisible(running)
         self.next_button.setVisible(not (running or self.stopped))
         self.next_button.setText(phrase("{next}  [Ctrl+T]", next=self.next_text()))
         self.call_off_button.setText(phrase("Call it off  [Esc]") if running else phrase("Back  [Esc]"))

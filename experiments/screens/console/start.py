@@ -46,8 +46,6 @@ class StartWindow(QtWidgets.QWidget):
         self.choice: RunRequest | None = None
         self.question: QuestionBox | None = None
         self._simulation_is_known = False
-        self._had: set[str] = set()
-        """Whoever was seen in the results folder."""
         self._closing = self._was_left = False
         self._scale = 0.0
         self._build()
@@ -123,7 +121,7 @@ class StartWindow(QtWidgets.QWidget):
             unread += str(error).splitlines()
         seen = overview(self._study)
         self._seen: Overview = replace(seen, problems=tuple(dict.fromkeys([*unread, *seen.problems])))
-        self._had.update(one.participant_id for one in self._seen.participants)
+        self._opening.had.update(one.participant_id for one in self._seen.participants)
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
 
@@ -144,13 +142,13 @@ class StartWindow(QtWidgets.QWidget):
                 )
             )
         self._study, results = now, now.results
-        if self._had and not known_codes(results, read_register(results)):
+        if self._opening.had and not known_codes(results, read_register(results)):
             raise PlaceError(
                 phrase(
                     "{results}: all who were in it are gone ({count}): it was moved, or its disk is away. Put it back; "
                     "or quit, and start Recoil again, to begin with nobody",
                     results=results.resolve(),
-                    count=len(self._had),
+                    count=len(self._opening.had),
                 )
             )
 
@@ -338,6 +336,7 @@ class StartWindow(QtWidgets.QWidget):
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
     ) -> None:
         if self.choice is None:
+            self._opening.had.update([] if training else [code])
             self.choice = RunRequest(
                 setup=self._setup(),
                 participant_id=code,
