@@ -22,7 +22,8 @@ from analysis.archive.archive_export import Archived, ArchiveRequest
 from analysis.archive.redaction import FIRST_MOMENT, REDACTED, moment_of, redacted, redacted_config
 from analysis.archive.verify import verify
 from analysis.report import placing
-from experiments.record.journal import contents_of, ending_of, read_journal
+from experiments.record.journal import contents_of, read_journal
+from experiments.record.lines import ending_of
 from experiments.session import remarks, steps
 from experiments.study.folders import PlaceError
 from experiments.study.register import RegisterError

@@ -37,7 +37,8 @@ from experiments.design.plan import Plan
 from experiments.earlier_run import UNMEASURED
 from experiments.load import load_setup
 from experiments.record import storage
-from experiments.record.journal import Contents, ending_of, read_journal
+from experiments.record.journal import Contents, read_journal
+from experiments.record.lines import ending_of
 from experiments.record.rebuild import shots_table, table
 from experiments.record.replay import history
 from experiments.run import Finished, run

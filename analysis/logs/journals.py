@@ -15,6 +15,7 @@ from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.messages import first_few, how_many
 from experiments.record import journal, replay, storage
 from experiments.record.journal import Contents, JournalError
+from experiments.record.lines import ending_of
 from experiments.record.names import JOURNAL_NAME, misnamed
 from experiments.record.rebuild import began_with, rows_beyond, table
 from experiments.record.tables import FILE_SUFFIX, DataKind
@@ -172,7 +173,7 @@ def compared_with(data: bytes, path: str, content: bytes) -> str:
     where = journal_of(path)
     if where == path:
         return f"its table is missing, so it was made again from this journal; `recoil rebuild {path}` writes it"
-    of_table, of_itself, _ = journal.ending_of(data)
+    of_table, of_itself, _ = ending_of(data)
     if of_table and of_table != hashlib.sha256(content).hexdigest():
         raise _edited(where, data, content, f"edited since the run; `recoil rebuild {where}` gives the original")
     return "" if of_itself else _compared_whole(where, content, data, finished=bool(of_table))

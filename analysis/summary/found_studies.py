@@ -14,6 +14,7 @@ from analysis.logs.journals import RunFile, journal_of, run_file
 from analysis.logs.reading import Logs
 from experiments.record import journal, storage
 from experiments.record.journal import Head, JournalError
+from experiments.record.lines import ending_of
 from experiments.record.names import journals
 from experiments.study.folders import freeze_status
 from experiments.study.preregistration import Chain, FreezeStatus, read_chain
@@ -146,4 +147,4 @@ def _read(file: RunFile) -> FoundRun | Literal["blank", "unread"]:
         head = journal.head_of(path, data)
     except JournalError:  # why it cannot be read is said elsewhere
         return "unread"
-    return "blank" if head is None else FoundRun(file=file, head=head, ended_utc=journal.ending_of(data)[-1])
+    return "blank" if head is None else FoundRun(file=file, head=head, ended_utc=ending_of(data)[-1])

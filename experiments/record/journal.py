@@ -388,20 +388,6 @@ def contents_of(path: Path, data: bytes) -> Contents | None:
     )
 
 
-def ending_of(data: bytes) -> tuple[str, str, str]:
-    """Of the bytes of a finished journal the hash of its table, that of itself, and when it ended; else empty.
-
-    The second is empty as well if any byte before the last record was changed. Much quicker than reading every record.
-    """
-    before, line = data[: data.rfind(b"\n", 0, -1) + 1], data[data.rfind(b"\n", 0, -1) + 1 :]
-    with suppress(LineError):
-        value = parsed_line(line)
-        if value.get("kind") == "finished" and line.endswith(b"\n"):
-            itself, said = hashlib.sha256(before).hexdigest(), value.get("journal_sha256")
-            return str(value.get("table_sha256")), itself if itself == said else "", str(value.get("utc"))
-    return "", "", ""
-
-
 def head_of(path: Path, data: bytes) -> Head | None:
     """The first record in the bytes of a journal; `None` if it is not whole. `JournalError` if it is none."""
     line, end, _ = data.partition(b"\n")
