@@ -42,7 +42,15 @@ _PATIENCE_S = 0.5
 
 
 class JournalError(RecoilError):
-    """A journal that cannot be written or read; the message says what is safe."""
+    """A journal that cannot be written or read; the message says what is safe.
+
+    `shown` is for people who must see no answer: place and what is said, with … for a `value` that was found in the
+    journal. It is empty where no place is named by itself: then the message may have such a value anywhere.
+    """
+
+    def __init__(self, said: str, *, at: Path | str = "", value: str = "") -> None:
+        super().__init__(f"{at}: {said.replace('…', value)}" if at else said)
+        self.shown = f"{at}: {said}" if at else ""
 
 
 class JournalGone(JournalError):  # noqa: N818 - what is so, not what went wrong
@@ -114,7 +122,7 @@ class Head(Record):
         try:
             return Plan.from_record(self.plan_json)
         except ValidationError as error:
-            raise JournalError(f"{self.path}: line 1: no plan of this version of Recoil") from error
+            raise JournalError("no plan of this version of Recoil", at=f"{self.path}: line 1") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -394,15 +402,15 @@ def head_of(path: Path, data: bytes) -> Head | None:
     if not end:
         return None
     if not path.name.endswith(ENDING) and not line.startswith(b"{"):
-        raise JournalError(f"{path}: is no journal (rule: a file sub-CODE_task-EXPERIMENT{ENDING} that a run wrote)")
-    value = _values(path, 0, line, "")
+        raise JournalError(f"is no journal (rule: a file sub-CODE_task-EXPERIMENT{ENDING} that a run wrote)", at=path)
+    at, value = f"{path}: line 1", _values(path, 0, line, "")
     if value["kind"] != "run" or not {"plan", "setup"} <= value.keys():
-        raise JournalError(f"{path}: line 1: not the head of a journal (kind `run` with `plan` and `setup`)")
+        raise JournalError("not the head of a journal (kind `run` with `plan` and `setup`)", at=at)
     for part in ("plan", "setup"):
         if sha256(value[part]) != value.get(f"{part}_sha256"):
-            raise JournalError(f"{path}: line 1: {part} does not have the hash {part}_sha256; it was changed")
+            raise JournalError(f"{part} does not have the hash {part}_sha256; it was changed", at=at)
     of_head = {"path": path, "plan_json": value["plan"], "setup_json": value["setup"], "laws_json": value.get("laws")}
-    found: Head = read_as(_reader(Head), value | of_head, f"{path}: line 1")
+    found: Head = read_as(_reader(Head), value | of_head, at)
     return found
 
 
@@ -426,8 +434,8 @@ def read_as(kind: TypeAdapter[Typed], value: object, place: str) -> Typed:
         return kind.validate_python(value)
     except ValidationError as error:
         first = error.errors()[0]
-        said = filter(None, (place, ".".join(str(part) for part in first["loc"]), first["msg"]))
-        raise JournalError(f"{': '.join(said)}; the record was changed") from error
+        found = filter(None, (".".join(str(part) for part in first["loc"]), first["msg"]))
+        raise JournalError("…; the record was changed", at=place, value=": ".join(found)) from error
 
 
 def _values(path: Path, number: int, line: bytes, before: str) -> dict[str, object]:
@@ -437,5 +445,5 @@ def _values(path: Path, number: int, line: bytes, before: str) -> dict[str, obje
             raise LineError(f"kind must be one of {', '.join(_KINDS)}; it was changed or damaged")
         check_chain(value, number, before)
     except LineError as error:
-        raise JournalError(f"{path}: line {number + 1}: {error}") from error
+        raise JournalError(error.said, at=f"{path}: line {number + 1}", value=error.value) from error
     return value

@@ -15,7 +15,14 @@ from device.messages import RecoilError
 
 
 class LineError(RecoilError):
-    """A line that is no record, or does not follow from the one before; the message has no place."""
+    """A line that is no record, or does not follow from the one before; the message has no place.
+
+    `said` has … where the message has `value`, which stands in the line.
+    """
+
+    def __init__(self, said: str, value: str = "") -> None:
+        super().__init__(said.replace("…", value))
+        self.said, self.value = said, value
 
 
 def strict_json(data: bytes, pairs: Callable[[Sequence[tuple[str, JsonValue]]], object] | None = None) -> object:
@@ -33,7 +40,7 @@ def parsed_line(line: bytes) -> dict[str, object]:
         if b"\\u" in line:
             json.dumps(value, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
-        raise LineError(f"not a JSON record ({_why_no_json(error)}); it was changed or damaged") from error
+        raise LineError("not a JSON record (…); it was changed or damaged", _why_no_json(error)) from error
     if not isinstance(value, dict):
         raise LineError("not a JSON object; it was changed or damaged")
     return value
@@ -62,7 +69,7 @@ def _finite(text: str) -> float:
 def check_chain(value: dict[str, object], number: int, before: str) -> None:
     """`LineError` unless the record's number `n` and its `link` follow from the line before."""
     if value.get("n") != number:
-        raise LineError(f"record number is {value.get('n')!r}, must be {number}; a line was lost or added")
+        raise LineError(f"record number is …, must be {number}; a line was lost or added", repr(value.get("n")))
     if value.get("link") != before:
         raise LineError(f"does not follow from line {number}, which was changed after it was written")
 

@@ -22,23 +22,18 @@ from experiments.record.tables import table_bytes
 
 def began_with(head: Head) -> DesignConfig:
     """The design that a run began with. `JournalError`: the journal's head holds none of this version."""
-    setup = head.setup_json if isinstance(head.setup_json, dict) else {}
+    at, setup = f"{head.path}: line 1", head.setup_json if isinstance(head.setup_json, dict) else {}
     design = setup.get("experiment")
     if not isinstance(design, dict):
-        raise JournalError(f"{head.path}: line 1: no design of this version of Recoil ({head.plan.experiment!r})")
+        raise JournalError(f"no design of this version of Recoil ({head.plan.experiment!r})", at=at)
     try:
-        return checked_table(DesignConfig, design, f"{head.path}: line 1")
-    except ConfigError as error:
-        raise changed_or_foreign(head, error) from error
-
-
-def changed_or_foreign(head: Head, error: ConfigError) -> JournalError:
-    """What is said of a journal whose setup this version cannot read: to be corrected as a config it is not."""
-    wrote = head.provenance.get("recoil", "unknown")
-    return JournalError(
-        f"{error}; but correct nothing in a journal: it was changed, or another version of Recoil wrote it (it names "
-        f"{wrote}, this is {recoil_version()}), which reads and rebuilds it"
-    )
+        return checked_table(DesignConfig, design, at)
+    except ConfigError as error:  # to be corrected as a config the journal is not
+        said = (
+            "…; but correct nothing in a journal: it was changed, or another version of Recoil wrote it (it names "
+            f"{head.provenance.get('recoil', 'unknown')}, this is {recoil_version()}), which reads and rebuilds it"
+        )
+        raise JournalError(said, at=at, value=str(error).removeprefix(f"{at}: ")) from error
 
 
 def table(contents: Contents) -> bytes:

@@ -91,7 +91,7 @@ def _read(contents: Contents, found: GrowingHistory) -> Iterator[steps.Step]:
             found.append((None, remark))
         elif line.kind == "outcome":
             if step is None:
-                raise JournalError(f"{_place(contents, line)}: an outcome without its step; a line was lost")
+                raise JournalError("an outcome without its step; a line was lost", at=_place(contents, line))
             found.append((step, _outcome(contents, line, step, shots)))
             step = None
 
@@ -112,14 +112,15 @@ def _check_trial(contents: Contents, line: Record, trial: Trial | None, planned:
     """`JournalError` for a step or remark about a trial that nobody planned."""
     if trial is not None and trial not in planned:
         where = f"session {trial.session}, set {trial.set}, trial {trial.trial}"
-        raise JournalError(f"{_place(contents, line)}: {where} is none of the plan in line 1; the record was changed")
+        raise JournalError(f"{where} is none of the plan in line 1; the record was changed", at=_place(contents, line))
 
 
 def _check_value(contents: Contents, line: Record, step: steps.Step | None, value: AnswerValue) -> None:
     """`JournalError` for an answer that is none to what was asked."""
     if not isinstance(step, steps.Asking) or not steps.is_answer(step, value):
         kind = steps.what(step) if isinstance(step, steps.Asking) else "answer"
-        raise JournalError(f"{_place(contents, line)}: value {value!r} is no {kind}; the record was changed")
+        said = f"value … is no {kind}; the record was changed"
+        raise JournalError(said, at=_place(contents, line), value=repr(value))
 
 
 def outcomes(history: History) -> list[tuple[steps.Step, steps.Outcome]]:

@@ -64,7 +64,7 @@ class JournalTail:
             return self._read_on()
         except OSError as error:
             self._stamp = None
-            raise JournalError(f"{self.path}: cannot be read ({error.strerror})") from error
+            raise JournalError(f"cannot be read ({error.strerror})", at=self.path) from error
 
     def unchanged(self) -> bool:
         """Whether the bytes that were read stand there still. `OSError`: they cannot be read."""
@@ -90,9 +90,9 @@ class JournalTail:
         anew = self._count == 0
         try:
             if not (self._count or whole) and data[:1] not in (b"", b"{"):
-                raise JournalError(f"{self.path}: line 1: no record, and no beginning of one; it was changed")
+                raise JournalError("no record, and no beginning of one; it was changed", at=f"{self.path}: line 1")
             if more and not whole:
-                raise JournalError(f"{self.path}: line {self._count + 1} is longer than any record; it was changed")
+                raise JournalError(f"line {self._count + 1} is longer than any record; it was changed", at=self.path)
             records = tuple(map(self._next, whole.split(b"\n")[:-1]))
             self._check_whole(more=more)
         except JournalError:
@@ -106,7 +106,7 @@ class JournalTail:
         self._count, self._length, self._link = self._count + 1, self._length + len(line) + 1, link_of(line)
         self._digest.update(line + b"\n")
         if self._count == self._most and self._link != self._most_link:
-            raise JournalError(f"{self.path}: was rewritten while it was watched; look for who changes it")
+            raise JournalError("was rewritten while it was watched; look for who changes it", at=self.path)
         return record
 
     def _record(self, line: bytes) -> Record:
@@ -114,7 +114,7 @@ class JournalTail:
             return record_of(self.path, self._count, line, self._link)
         head = head_of(self.path, line + b"\n")
         if head is None:
-            raise JournalError(f"{self.path}: line 1: no whole record")
+            raise JournalError("no whole record", at=f"{self.path}: line 1")
         return head
 
     def _check_whole(self, *, more: bool) -> None:
@@ -125,6 +125,7 @@ class JournalTail:
             self._most, self._most_link = self._count, self._link
         elif not more:
             raise JournalError(
-                f"{self.path}: has {self._count} whole records and had {self._most} while it was watched; it was cut, "
-                "so put back a copy"
+                f"has {self._count} whole records and had {self._most} while it was watched; it was cut, so put back "
+                "a copy",
+                at=self.path,
             )

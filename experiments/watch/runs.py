@@ -5,7 +5,6 @@ The journal's steps and remarks are led through the same table of states that th
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -127,7 +126,7 @@ class RunSoFar:
     def __init__(self, head: Head) -> None:
         self.head, self.plan, self.design = head, head.plan, began_with(head)
         if not self.plan.trials:
-            raise JournalError(f"{head.path}: line 1: a plan without trials")
+            raise JournalError("a plan without trials", at=f"{head.path}: line 1")
         self._told: list[tuple[steps.Step | None, steps.Outcome | remarks.Remark]] = []
         self._timing, self._position = RunTiming(), Position()
         self._open: tuple[Record, ...] = ()
@@ -281,22 +280,6 @@ def fault_text(word: object) -> str:
             return ""
 
 
-_QUOTED = re.compile(r"(?<!\w)(?:'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\")")
-_NUMBER = re.compile(r"(value |number is )-?[\d.]\S*?(?=[,; ])")
-
-
-def without_values(message: str) -> str:
-    """What is wrong with a record, without what stands in it: that may be an answer.
-
-    >>> without_values("a.jsonl: line 7: value 'sideways' is no answer; the record was changed")
-    'a.jsonl: line 7: value … is no answer; the record was changed'
-    >>> without_values("a.jsonl: line 7: value 11.5 is no rating")
-    'a.jsonl: line 7: value … is no rating'
-    """
-    path, line, rest = message.partition(": line ")
-    return path + line + _NUMBER.sub(r"\1…", _QUOTED.sub("…", rest))
-
-
 def _named(path: Path) -> tuple[str, str, bool]:
     """Code, experiment and whether it is a practice, by a journal's name; the name itself, where it is none."""
     name = JOURNAL_NAME.fullmatch(path.name)
@@ -330,7 +313,7 @@ class WatchedRun:
         try:
             return self._take_news()
         except JournalError as error:
-            problem = without_values(str(error))
+            problem = error.shown or f"{self.path}: makes no run; it was changed"
         except Exception as error:  # noqa: BLE001 - whatever one journal does, the others are shown
             problem = f"{self.path}: makes no run ({type(error).__name__}); it was changed"
         before, self._problem, self._row = self._problem, problem, None
