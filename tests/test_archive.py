@@ -22,6 +22,7 @@ from analysis.archive.archive_export import Archived, ArchiveRequest
 from analysis.archive.redaction import FIRST_MOMENT, REDACTED, moment_of, redacted, redacted_config
 from analysis.archive.verify import verify
 from analysis.report import placing
+from analysis.report.serial import plain
 from experiments.record.journal import contents_of, read_journal
 from experiments.record.lines import ending_of
 from experiments.session import remarks, steps
@@ -319,7 +320,9 @@ def test_a_changed_byte_anywhere_is_found_and_its_file_named(copy: Path) -> None
         (copy / path).write_bytes(before[:place] + bytes([other]) + before[place + 1 :])
         found = verify(copy)
         assert not found.whole
-        assert path == manifest.MANIFEST_FILE or any(fault.startswith(f"{path}: changed") for fault in found.faults)
+        assert path == manifest.MANIFEST_FILE or any(
+            str(fault).startswith(f"{path}: changed") for fault in found.faults
+        )
         (copy / path).write_bytes(before)
     assert manifest.read_manifest(copy).faults == ()
 
@@ -363,13 +366,13 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_a_foreign_name_of_several_lines_is_one_line_of_what_is_said(copy: Path, name: str, shown: str) -> None:
     (copy / "results" / name).touch()
     (fault,) = verify(copy).faults
-    assert fault == f"results/{shown}: a foreign file: the manifest does not list it"
+    assert str(fault) == f"results/{shown}: a foreign file: the manifest does not list it"
 
 
 def test_what_stands_in_a_changed_file_is_one_line_of_what_is_said(copy: Path) -> None:
     _edited(copy, "analysis/statistics.json", '"preference": {', '"a\\nforged: line": "x\\ny", "preference": {')
     (fault,) = verify(copy).faults
-    assert r"a\nforged: line is x\ny in the archive" in fault
+    assert r"a\nforged: line is x\ny in the archive" in str(fault)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -377,7 +380,7 @@ def test_what_is_not_as_it_was_archived_is_named(copy: Path, fault: str) -> None
     change, said = FAULTS[fault]
     change(copy)
     found = verify(copy)
-    assert any(one.startswith(said) for one in found.faults) or said in " ".join(found.faults)
+    assert any(str(one).startswith(said) for one in found.faults) or said in " ".join(map(str, found.faults))
     assert found.rebuilt == 0
 
 
@@ -403,7 +406,7 @@ def test_a_forger_who_writes_the_manifest_anew_is_found_by_the_journals(copy: Pa
     placing.write_file(copy, "preregistration/preregistration-2.md", b"14 participants")
     sealed(copy)
     found = verify(copy)
-    said = "\n".join(found.faults)
+    said = "\n".join(map(str, found.faults))
     assert "preregistration/preregistration-2.json: is missing" in said
     assert "contents.csv: P02, direction, finished: there is a journal, and no row" in said
     assert "contents.csv: P02, preference, not finished: there is a row, and no such journal" in said
@@ -415,13 +418,14 @@ def test_a_forger_who_writes_the_manifest_anew_is_found_by_the_journals(copy: Pa
 def test_a_journal_that_was_changed_is_named_with_its_line(copy: Path) -> None:
     _edited(copy, JOURNAL, '"kind":"outcome"', '"kind":"remark"')
     (fault,) = verify(copy).faults
-    assert f"{JOURNAL}: line " in fault
+    assert f"{JOURNAL}: line " in str(fault)
 
 
 def test_a_table_that_no_journal_makes_is_named(copy: Path) -> None:
     shutil.copy(copy / "analysis" / "preference_long.csv", copy / "analysis" / "other.csv")
     sealed(copy)
-    assert verify(copy).faults == ("analysis/other.csv: no journal of the archive makes it",)
+    (fault,) = verify(copy).faults
+    assert str(fault) == "analysis/other.csv: no journal of the archive makes it"
 
 
 def test_the_verdict_names_the_files_and_which_recoil_made_them(copy: Path) -> None:
@@ -438,6 +442,24 @@ def test_the_verdict_names_the_files_and_which_recoil_made_them(copy: Path) -> N
     assert f"Recoil 0.0.1 made the archive, and this is {ours}: verify it with that one" in verify(copy).as_text()
 
 
+def test_the_verdict_counts_files_whatever_they_are_called(copy: Path) -> None:
+    for name in ("a: b.csv", "a: c.csv"):
+        shutil.copy(copy / "analysis" / "preference_long.csv", copy / "analysis" / name)
+    sealed(copy)
+    said = verify(copy).as_text()
+    assert "but 2 files are not what this Recoil makes of its journals: analysis/a: b.csv, analysis/a: c.csv; " in said
+
+
+def test_the_verdict_on_what_was_frozen_names_no_other_recoil(copy: Path) -> None:
+    placing.write_file(copy, "preregistration/preregistration-2.md", b"14 participants")
+    sealed(copy)
+    found = verify(copy)
+    faults = [*map(str, found.faults)]
+    assert all(": is missing" in fault and fault.startswith("preregistration/") for fault in faults)
+    assert found.as_text().endswith("but its preregistrations are not all there as they were frozen")
+    assert plain(found)["faults"] == faults
+
+
 @pytest.mark.parametrize(("by", "whole"), [(1e-13, True), (1e-6, False)])
 def test_other_versions_may_differ_by_a_millionth_of_a_millionth(copy: Path, by: float, whole: bool) -> None:
     place = copy / "analysis" / "statistics.json"
@@ -448,7 +470,8 @@ def test_other_versions_may_differ_by_a_millionth_of_a_millionth(copy: Path, by:
     _edited(copy, "analysis/statistics.json", f'"numpy": "{statistics["versions"]["numpy"]}"', '"numpy": "1.0"')
     found = verify(copy)
     assert found.whole == whole
-    (said,) = found.remarks or found.faults
+    said = "\n".join(map(str, found.remarks or found.faults))
+    assert said.count("\n") == 0
     assert "preference.means.asymmetric-2 is" in said
     assert ("other versions" in said) == whole
 
@@ -475,21 +498,21 @@ def test_an_archive_without_its_manifest_is_none(copy: Path) -> None:
 def test_a_file_that_is_no_json_object_is_a_fault_of_the_archive(copy: Path, path: str, content: str) -> None:
     placing.write_file(copy, path, content.encode())
     sealed(copy)
-    assert any(f"{path}: " in fault for fault in verify(copy).faults)
+    assert any(f"{path}: " in str(fault) for fault in verify(copy).faults)
 
 
 @pytest.mark.parametrize("version", ["NaN", "1e999"])
 def test_versions_that_are_no_numbers_are_a_fault_of_the_archive(copy: Path, version: str) -> None:
     _edited(copy, "analysis/statistics.json", '"versions": {', f'"versions": {{"numpy-like": {version},')
     (fault,) = verify(copy).faults
-    assert f"{version} is no number of JSON" in fault
+    assert f"{version} is no number of JSON" in str(fault)
 
 
 def test_settings_that_say_nothing_are_named(copy: Path) -> None:
     (copy / "archive.json").write_text("[]")
     sealed(copy)
     (fault, *_) = verify(copy).faults
-    assert "archive.json" in fault
+    assert "archive.json" in str(fault)
 
 
 # where it is put

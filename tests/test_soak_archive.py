@@ -40,7 +40,9 @@ def test_verify_finds_each_of_200_single_byte_changes(archive: Path, soak: Soak)
         path.write_bytes(before)
         name = path.relative_to(archive).as_posix()
         found += not said.whole
-        named += name == manifest.MANIFEST_FILE or any(fault.startswith(f"{name}: changed") for fault in said.faults)
+        named += name == manifest.MANIFEST_FILE or any(
+            str(fault).startswith(f"{name}: changed") for fault in said.faults
+        )
     assert (found, named) == (CHANGES, CHANGES)
     assert verify(archive).whole
     how = f"random file of {len(files)}, random byte, any other value; seed 1"

@@ -13,10 +13,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.logs.files import shown_name
+from device.messages import escaped
 from experiments.study.folders import PlaceError
 
 MANIFEST_FILE = "manifest-sha256.txt"
 _LINE = re.compile(r"([0-9a-f]{64})  ([^\x00-\x1f\\]+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArchiveFault:
+    """Something wrong in an archive, a line as text; `file` is empty where it is about no one file."""
+
+    said: str
+    file: str = ""
+
+    def __str__(self) -> str:
+        return escaped(f"{shown_name(self.file)}: {self.said}" if self.file else self.said)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +37,7 @@ class Hashes:
 
     listed: Mapping[str, str]
     sha256: str
-    faults: tuple[str, ...] = ()
+    faults: tuple[ArchiveFault, ...] = ()
 
 
 def manifest_bytes(folder: Path) -> bytes:
@@ -48,18 +60,19 @@ def read_manifest(folder: Path) -> Hashes:
         )
     lines = data.decode("utf-8", "surrogateescape").split("\n")
     found = {match[2]: match[1] for line in lines if (match := _LINE.fullmatch(line))}
-    faults = [
-        f"{MANIFEST_FILE}, line {number}: is no hash and path, so it was changed"
+    wrong = [
+        f"line {number}: is no hash and path, so it was changed"
         for number, line in enumerate(lines[:-1], start=1)
         if not _LINE.fullmatch(line)
     ]
-    if not faults and _text(found).encode("utf-8", "surrogateescape") != data:
-        faults = [f"{MANIFEST_FILE}: is not as it was written: order, a doubled path or the end differs"]
-    return Hashes(listed=found, sha256=hashlib.sha256(data).hexdigest(), faults=tuple(faults))
+    if not wrong and _text(found).encode("utf-8", "surrogateescape") != data:
+        wrong = ["is not as it was written: order, a doubled path or the end differs"]
+    faults = tuple(ArchiveFault(file=MANIFEST_FILE, said=said) for said in wrong)
+    return Hashes(listed=found, sha256=hashlib.sha256(data).hexdigest(), faults=faults)
 
 
-def faults(folder: Path, hashes: Hashes) -> Iterator[str]:
-    """What of an archive is not what its manifest lists, each with its path: missing, changed, a link, foreign."""
+def faults(folder: Path, hashes: Hashes) -> Iterator[ArchiveFault]:
+    """What of an archive is not what its manifest lists: missing, changed, a link, foreign."""
     there = dict(_entries(folder))
     folders = {str(parent) for path in hashes.listed for parent in Path(path).parents}
     for path in sorted({*hashes.listed, *there} - {MANIFEST_FILE}):
@@ -68,7 +81,7 @@ def faults(folder: Path, hashes: Hashes) -> Iterator[str]:
             continue
         said = _fault(folder / path, kind, listed)
         if said:
-            yield f"{shown_name(path)}: {said}"
+            yield ArchiveFault(file=path, said=said)
 
 
 def _fault(path: Path, kind: str | None, listed: str | None) -> str:

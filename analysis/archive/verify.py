@@ -12,16 +12,17 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from analysis.archive import making, manifest
 from analysis.archive.contents import CONTENTS
 from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
+from analysis.archive.manifest import ArchiveFault
 from analysis.logs.files import shown_name
 from analysis.logs.reading import Track
 from analysis.report import placing
-from analysis.report.serial import as_json
+from analysis.report.serial import as_json, written
 from analysis.summary.analyze import result_files
 from analysis.summary.results import STATISTICS_FILE
 from device.messages import RecoilError, escaped, first_few
@@ -41,9 +42,12 @@ _NAMED = 20
 """So many numbers of a file are named."""
 
 
+_LINES = written(lambda faults: [*map(str, faults)])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What was checked of an archive, what is wrong with it, and what there is to say otherwise, a line each.
+    """What was checked of an archive, what is wrong with it, and what there is to say otherwise.
 
     `manifest_sha256` vouches for all of it: whoever published it knows which archive this is. `rebuilt` are the tables
     and statistics that were made again; none if a hash is wrong already. `recoil`: what its statistics name as the
@@ -54,8 +58,8 @@ class Verified:
     manifest_sha256: str
     files: int
     rebuilt: int
-    faults: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
+    faults: tuple[ArchiveFault, ...] = field(metadata=_LINES)
+    remarks: tuple[ArchiveFault, ...] = field(default=(), metadata=_LINES)
     recoil: str | None = None
 
     @property
@@ -72,10 +76,11 @@ class Verified:
             return f"{shown}: whole ({self.files} files), and {made}\n{vouches}"
         if not self.rebuilt:
             return f"{shown}: {len(self.faults)} of its parts are not as they were archived"
-        files = [*dict.fromkeys(fault.partition(": ")[0] for fault in self.faults)]
+        files = [*dict.fromkeys(shown_name(fault.file) for fault in self.faults if fault.file)]
         one = "1 file is" if len(files) == 1 else f"{len(files)} files are"
-        otherwise = f"{one} not what this Recoil makes of its journals: {first_few(files, _FILES)}"
-        return f"{shown}: every file has the hash of the manifest, but {otherwise}; {self._made_by()}"
+        otherwise = f"{one} not what this Recoil makes of its journals: {first_few(files, _FILES)}; {self._made_by()}"
+        but = otherwise if files else "its preregistrations are not all there as they were frozen"
+        return f"{shown}: every file has the hash of the manifest, but {but}"
 
     def _made_by(self) -> str:
         if self.recoil in (None, recoil_version()):
@@ -98,24 +103,25 @@ def verify(folder: Path, track: Track = iter) -> Verified:
         raise PlaceError(f"{folder}: no such folder; name an archive that `recoil export archive` wrote")
     hashes = manifest.read_manifest(folder)
     faults = [*hashes.faults, *manifest.faults(folder, hashes)]
-    remarks, rebuilt, recoil = list[str](), 0, None
+    remarks, rebuilt, recoil = list[ArchiveFault](), 0, None
     if not faults:
         with tempfile.TemporaryDirectory(prefix="recoil-verify-") as place:
             try:
                 made = [*_made_again(folder, Path(place), hashes.listed, track)]
                 faults, remarks = _compared(folder, hashes.listed, made)
-                faults += [*_contents_faults(folder), *making.preregistration_faults(folder)]
+                faults += [ArchiveFault(file=CONTENTS, said=said) for said in _contents_faults(folder)]
+                faults += [ArchiveFault(said=said) for said in making.preregistration_faults(folder)]
                 rebuilt, recoil = len(made), _recoil_of(_versions(folder))
             except RecoilError as error:
                 said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")
-                faults = [f"cannot be made again: {line}" for line in said.split("\n")]
+                faults = [ArchiveFault(said=f"cannot be made again: {line}") for line in said.split("\n")]
     return Verified(
         archive=str(folder),
         manifest_sha256=hashes.sha256,
         files=len(hashes.listed),
         rebuilt=rebuilt,
-        faults=tuple(map(escaped, faults)),
-        remarks=tuple(map(escaped, remarks)),
+        faults=tuple(faults),
+        remarks=tuple(remarks),
         recoil=recoil,
     )
 
@@ -176,37 +182,39 @@ def _json(path: Path) -> object:
         raise PlaceError(f"{path}: is no JSON file that can be read ({error})") from error
 
 
-def _compared(folder: Path, listed: Mapping[str, str], made: Sequence[_Made]) -> tuple[list[str], list[str]]:
+def _compared(
+    folder: Path, listed: Mapping[str, str], made: Sequence[_Made]
+) -> tuple[list[ArchiveFault], list[ArchiveFault]]:
     """What differs between an archive and what its journals make: what must not, and what may."""
-    faults, remarks = list[str](), list[str]()
+    faults, remarks = list[ArchiveFault](), list[ArchiveFault]()
     for one in made:
         if one.path not in listed:
-            faults.append(f"{one.path}: missing: its journals make it")
+            faults.append(ArchiveFault(file=one.path, said="missing: its journals make it"))
         elif (folder / one.path).read_bytes() != one.data:
             found = _differences(folder / one.path, one)
             (remarks if one.close and all(close for _, close in found) else faults).extend(_named(one.path, found))
     tables = {path for path in listed if _is_made(path)} - {one.path for one in made}
-    faults += [f"{path}: no journal of the archive makes it" for path in sorted(tables)]
+    faults += [ArchiveFault(file=path, said="no journal of the archive makes it") for path in sorted(tables)]
     return faults, remarks
 
 
 def _contents_faults(folder: Path) -> Iterator[str]:
     """Runs whose journal is there and which the list of runs has otherwise, and the other way round."""
     if not (folder / CONTENTS).is_file():
-        yield f"{CONTENTS}: missing: every archive has one"
+        yield "missing: every archive has one"
         return
     try:
         with (folder / CONTENTS).open(encoding="utf-8", newline="") as file:
             rows = [row for row in csv.DictReader(file) if row.get("in_archive") != "0"]
     except (ValueError, csv.Error) as error:
-        yield f"{CONTENTS}: cannot be read ({error})"
+        yield f"cannot be read ({error})"
         return
     listed = sorted(tuple(str(row.get(key)) for key in ("participant_id", "experiment", "state")) for row in rows)
     there = sorted(map(_as_listed, (folder / RESULTS).rglob(f"*{journal.ENDING}")))
     for run in sorted({*listed, *there}):
         if listed.count(run) != there.count(run):
             what = "a journal, and no row" if run in there else "a row, and no such journal"
-            yield f"{CONTENTS}: {', '.join(run)}: there is {what}"
+            yield f"{', '.join(run)}: there is {what}"
 
 
 def _as_listed(path: Path) -> tuple[str, ...]:
@@ -221,11 +229,12 @@ def _is_made(path: str) -> bool:
     return (room, ending) in ((RESULTS, "csv"), (ANALYSIS, "csv"), (BIDS, "tsv"))
 
 
-def _named(path: str, found: Sequence[tuple[str, bool]]) -> Iterator[str]:
+def _named(path: str, found: Sequence[tuple[str, bool]]) -> Iterator[ArchiveFault]:
     for said, close in found[:_NAMED]:
-        yield f"{path}: {said}{f' (less than {CLOSE:g} apart: other versions)' if close else ''}"
+        other = f" (less than {CLOSE:g} apart: other versions)" if close else ""
+        yield ArchiveFault(file=path, said=f"{said}{other}")
     if len(found) > _NAMED:
-        yield f"{path}: and {len(found) - _NAMED} more differences"
+        yield ArchiveFault(file=path, said=f"and {len(found) - _NAMED} more differences")
 
 
 def _differences(path: Path, made: _Made) -> list[tuple[str, bool]]:
