@@ -15,12 +15,12 @@ from device.twin.core import IDENTITY
 from device.twin.sockets import Pty, Socket, Tcp
 from device.twin.twin import Make, Troubles, Twin
 from experiments.clock import RealClock
+from experiments.config.door import ConfigError
 from experiments.doctor.checks import GunLeftArmed, LanguageAsked, carry_out_check, checks
 from experiments.doctor.figures import DoctorFinding
 from experiments.doctor.verdicts import not_fired, overall
 from experiments.load import find, load_gun
 from experiments.record import storage
-from experiments.study.folders import PlaceError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +46,7 @@ class Plugged:
 
 
 def serve(asked: TwinRequest, tell: Callable[[Plugged], None]) -> None:
-    """Be a gun until interrupted. `tell` is called once it can be opened. `PlaceError`: it cannot be so."""
+    """Be a gun until interrupted. `tell` is called once it can be opened. `ConfigError`: it cannot be so."""
     gun = load_gun(find(asked.gun))
     methods = {name: gun.rendering(name) for name in gun.methods}
     socket = _socket(asked)
@@ -54,7 +54,7 @@ def serve(asked: TwinRequest, tell: Callable[[Plugged], None]) -> None:
     try:
         socket.plug()
     except OSError as error:
-        raise PlaceError(f"the twin cannot be plugged in here: {error}; try --tcp PORT, or another --link") from error
+        raise ConfigError(f"the twin cannot be plugged in here: {error}; try --tcp PORT, or another --link") from error
     try:
         tell(Plugged(address=socket.address, gun=_gun_option(socket.address, asked.speed)))
         twin.serve()
@@ -64,7 +64,7 @@ def serve(asked: TwinRequest, tell: Callable[[Plugged], None]) -> None:
 
 def _socket(asked: TwinRequest) -> Socket:
     if asked.tcp is not None and asked.link is not None:
-        raise PlaceError("--tcp and --link: give one of them")
+        raise ConfigError("--tcp and --link: give one of them")
     return Pty(asked.link) if asked.tcp is None else Tcp(asked.tcp)
 
 
@@ -74,16 +74,16 @@ def _gun_option(address: str, speed: float) -> str:
 
 def _make(asked: TwinRequest) -> Make:
     if not 0 < asked.speed <= MAX_SPEED:
-        raise PlaceError(f"--speed is {asked.speed:g}; it must be above 0 and at most {MAX_SPEED:g}")
+        raise ConfigError(f"--speed is {asked.speed:g}; it must be above 0 and at most {MAX_SPEED:g}")
     troubles = troubles_of(asked.troubles)
     if troubles.unplugs and asked.tcp is None and asked.link is None:
-        raise PlaceError("--trouble unplug...: a new pseudo-terminal has a new name; give --link PATH that stays")
+        raise ConfigError("--trouble unplug...: a new pseudo-terminal has a new name; give --link PATH that stays")
     identity = IDENTITY if asked.wire is None else replace(IDENTITY, wire=asked.wire)
     return Make(identity=identity, speed=asked.speed, drift_ppm=asked.drift_ppm, troubles=troubles, seed=asked.seed)
 
 
 def troubles_of(words: Sequence[str]) -> Troubles:
-    """Troubles from `name=value`. `PlaceError` names the word and what may stand there.
+    """Troubles from `name=value`. `ConfigError` names the word and what may stand there.
 
     >>> troubles_of(["lose=0.01", "jitter_s=0.005"]).jitter_s
     0.005
@@ -97,7 +97,7 @@ def troubles_of(words: Sequence[str]) -> Troubles:
             found[name] = _number(name, value)
             Troubles(**{name: found[name]})
         except ValueError as error:
-            raise PlaceError(f"--trouble {word}: {error}") from error
+            raise ConfigError(f"--trouble {word}: {error}") from error
     return Troubles(**found)
 
 

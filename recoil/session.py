@@ -30,7 +30,7 @@ from experiments.screens.terminal import TerminalScreen
 from experiments.screens.texts import doubt_text
 from experiments.study.balance import unread
 from experiments.study.enrolment import code_doubt, code_prefix_of, not_on_record
-from experiments.study.folders import PlaceError, check_code, known_codes, place
+from experiments.study.folders import check_code, known_codes, place
 from experiments.study.preregistration import run_warnings
 from experiments.study.register import read_register
 
@@ -62,12 +62,12 @@ class LanguageOptions:
 
 
 def run_session(request: RunRequest, wanted: LanguageOptions = LanguageOptions()) -> Place:
-    """Carry out a run. `PlaceError` for what cannot be done here; a stop raises `KeyboardInterrupt`."""
+    """Carry out a run. `ConfigError` and `PlaceError`: it cannot be done here; a stop raises `KeyboardInterrupt`."""
     check_code(request.participant_id)
     _check_screen(request)
     check_pace(request.screen, request.gun)
     if request.practice and request.again == "resume":
-        raise PlaceError("--resume: a practice is begun anew each time; leave --resume or --practice out")
+        raise ConfigError("--resume: a practice is begun anew each time; leave --resume or --practice out")
     if request.again == "resume":
         check_resumable(request)
     request = replace(request, language=_language(request, wanted), catalogues=wanted.folder)
@@ -148,14 +148,14 @@ def _language(request: RunRequest, wanted: LanguageOptions) -> Language:
 
 
 def _check_terminal(request: RunRequest) -> None:
-    """`PlaceError` if a terminal cannot write what is to be read out: it would put a question mark for each letter."""
+    """`ConfigError` if a terminal cannot write what is to be read out: it would put a question mark for each letter."""
     if request.screen != "terminal" or request.language is ENGLISH:
         return
     encoding = sys.stdout.encoding
     try:
         letters_of(request.language, request.setup).encode(encoding)
     except UnicodeEncodeError as error:
-        raise PlaceError(
+        raise ConfigError(
             f"--language {request.language.code}: this terminal writes {encoding}, which has no "
             f"{error.object[error.start]!r}; set it to UTF-8 (LANG=C.UTF-8), or use --screen console"
         ) from error
@@ -163,21 +163,21 @@ def _check_terminal(request: RunRequest) -> None:
 
 def _check_screen(request: RunRequest) -> None:
     if request.screen == "terminal" and not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise PlaceError(
+        raise ConfigError(
             "--screen terminal: standard input and output are no terminal: start it without a pipe, or use --screen "
             "console, which has a window; --screen synthetic is answered by a synthetic participant"
         )
     if request.screen != "console" and (request.visual or request.options != ParticipantOptions()):
-        raise PlaceError(
+        raise ConfigError(
             "--visual, --participant-screen, --participant-keys, --participant-monitor and --noise go with "
             "--screen console"
         )
 
 
 def check_pace(screen: str, gun: str) -> None:
-    """`PlaceError`, if people were to answer on a clock that goes faster than they live: a twin's in a hurry."""
+    """`ConfigError`, if people were to answer on a clock that goes faster than they live: a twin's in a hurry."""
     if screen != "synthetic" and (_speed(gun) or 1.0) != 1.0:
-        raise PlaceError(
+        raise ConfigError(
             f"--gun {gun}: --screen {screen} is for people, who live no faster than the world; start `recoil twin` "
             "without --speed and leave out ?speed, or use --screen synthetic"
         )
@@ -201,7 +201,7 @@ def _speed(gun: str) -> float | None:
     try:
         return speed_of(gun)
     except ValueError as error:
-        raise PlaceError(f"--gun {gun}: {error}") from error
+        raise ConfigError(f"--gun {gun}: {error}") from error
 
 
 def _at_console(request: RunRequest) -> Finished:
@@ -221,9 +221,9 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
     """The start window at the console, and one run after the other from it; `request` is without a participant."""
     if request.screen != "console":
         code = "S01, or another code of a synthetic participant" if request.screen == "synthetic" else "CODE"
-        raise PlaceError(f"who runs? Add --participant {code}; --screen console has a start window that asks")
+        raise ConfigError(f"who runs? Add --participant {code}; --screen console has a start window that asks")
     if request.again != "ask" or request.visual or request.practice:
-        raise PlaceError(
+        raise ConfigError(
             "--resume, --fresh, --practice and --visual go with --participant CODE; the start window asks by itself"
         )
     check_pace("console", request.gun)
@@ -240,7 +240,7 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
 
 @contextmanager
 def _needs_gui() -> Iterator[None]:
-    """`PlaceError`, with what to install, where the import of the console fails."""
+    """`ConfigError`, with what to install, where the import of the console fails."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -249,17 +249,19 @@ def _needs_gui() -> Iterator[None]:
         raise _no_console(f"they cannot be loaded: {said_by(error)}") from error
 
 
-def _no_console(why: str) -> PlaceError:
-    return PlaceError(
+def _no_console(why: str) -> ConfigError:
+    return ConfigError(
         f"--screen console needs the screens ({why}): run `make full` in Recoil's folder (without make: "
         "docs/install.md), or use --screen terminal; `recoil doctor` says what else is missing"
     )
 
 
 def again(*, resume: bool, fresh: bool, reason: str) -> Again:
-    """What to do with an unfinished run. `PlaceError` for options that do not go together."""
+    """What to do with an unfinished run. `ConfigError` for options that do not go together."""
     if resume and fresh:
-        raise PlaceError("--resume and --fresh: give one of them; the first goes on with a run, the second starts anew")
+        raise ConfigError(
+            "--resume and --fresh: give one of them; the first goes on with a run, the second starts anew"
+        )
     if reason and not fresh:
-        raise PlaceError("--reason: goes with --fresh, and says why the unfinished run is set aside")
+        raise ConfigError("--reason: goes with --fresh, and says why the unfinished run is set aside")
     return "resume" if resume else "fresh" if fresh else "ask"

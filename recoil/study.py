@@ -12,9 +12,10 @@ from analysis.report.section import Section, Table
 from analysis.report.terminal import with_tables
 from device.messages import how_many
 from experiments.clock import RealClock, date_text
+from experiments.config.door import ConfigError
 from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
-from experiments.study.folders import Overview, PlaceError, StudyFolder, known_codes, open_study, overview
+from experiments.study.folders import Overview, StudyFolder, known_codes, open_study, overview
 from experiments.study.register import read_register
 from experiments.study.study import Facts, Participant, RunProgress, eligible, taking_part
 
@@ -42,10 +43,10 @@ class StudyStatus:
 
 
 def change(options: Mapping[str, str | None], facts: Mapping[str, object], reason: str | None) -> StudyChange | None:
-    """What is to be changed; `None` for a look alone. `PlaceError` for options that do not go together."""
+    """What is to be changed; `None` for a look alone. `ConfigError` for options that do not go together."""
     given = [(action, code) for action, code in options.items() if code is not None]
     if len(given) > 1:
-        raise PlaceError(f"{' and '.join(f'--{action}' for action, _ in given)}: give one of them at a time")
+        raise ConfigError(f"{' and '.join(f'--{action}' for action, _ in given)}: give one of them at a time")
     action, code = given[0] if given else ("", "")
     _refuse_stray(action, facts, reason)
     if not action:
@@ -56,11 +57,11 @@ def change(options: Mapping[str, str | None], facts: Mapping[str, object], reaso
 def _refuse_stray(action: str, facts: Mapping[str, object], reason: str | None) -> None:
     given = [_OPTIONS[fact] for fact, value in facts.items() if value is not None]
     if given and action != "join":
-        raise PlaceError(f"{', '.join(given)}: facts go with --join CODE")
+        raise ConfigError(f"{', '.join(given)}: facts go with --join CODE")
     if reason is None and action in _REASONED:
-        raise PlaceError(f"--{action}: needs --reason TEXT, which is kept in the register; never a name")
+        raise ConfigError(f"--{action}: needs --reason TEXT, which is kept in the register; never a name")
     if reason is not None and action not in _REASONED:
-        raise PlaceError("--reason: goes with --exclude CODE, --left CODE or --readmit CODE")
+        raise ConfigError("--reason: goes with --exclude CODE, --left CODE or --readmit CODE")
 
 
 def _facts(values: Mapping[str, object]) -> Facts:
@@ -68,7 +69,7 @@ def _facts(values: Mapping[str, object]) -> Facts:
         return Facts.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
-        raise PlaceError(f"{_OPTIONS[str(first['loc'][0])]} {first['input']!r}: {first['msg']}") from error
+        raise ConfigError(f"{_OPTIONS[str(first['loc'][0])]} {first['input']!r}: {first['msg']}") from error
 
 
 def study(folder: Path, change: StudyChange | None) -> tuple[StudyStatus, tuple[str, ...]]:

@@ -9,10 +9,10 @@ from dataclasses import replace
 import pytest
 
 from device.wire.errors import WireError
+from experiments.config.door import ConfigError
 from experiments.record.journal import read_journal
 from experiments.record.replay import history
 from experiments.session.steps import Failed
-from experiments.study.folders import PlaceError
 from recoil.rig import troubles_of
 from recoil.session import check_pace
 from tests.at_runs import shorten
@@ -173,7 +173,7 @@ def test_the_twin_refuses_what_it_cannot_be(recoil):
         done = recoil("twin", *words)
         assert done.returncode == 2
         assert part in done.stderr
-    with pytest.raises(PlaceError, match="it must be a number"):
+    with pytest.raises(ConfigError, match="it must be a number"):
         troubles_of(["lose=much"])
 
 
@@ -193,7 +193,7 @@ def test_a_twin_in_a_hurry_is_refused_where_people_answer(recoil, who):
     assert done.returncode == 2
     assert "--screen console is for people, who live no faster than the world" in done.stderr
     assert "Traceback" not in done.stderr
-    with pytest.raises(PlaceError, match="--screen terminal is for people"):
+    with pytest.raises(ConfigError, match="--screen terminal is for people"):
         check_pace("terminal", "serial:/dev/pts/9?speed=20")
     check_pace("terminal", "serial:/dev/pts/9")
     check_pace("synthetic", "serial:/dev/pts/9?speed=20")
