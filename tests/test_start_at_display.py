@@ -308,8 +308,10 @@ def test_a_double_press_of_practice_practises_once(pilot: Path, display: str) ->
     with started(pilot, display) as (screen, eye):
         wait_for(eye, having("Next: P01"))
         enter(screen)
+        screen.keys.press("p", "Control_L")
+        wait_for(eye, having("The gun is SIMULATED", "Practise, simulated", "Leave it"))
         for _ in range(2):
-            screen.keys.press("p", "Control_L")
+            screen.keys.press("s", "Control_L")
         wait_until(lambda: last_record(practice / "sub-P01_task-direction_practice_journal.jsonl") != {})
         screen.process.terminate()
         assert screen.end()[0] == 130
@@ -365,6 +367,8 @@ def test_where_there_can_be_no_markers_the_window_says_so_and_begins_no_run(
         assert "sends markers (LSL)" in wait_for(eye, having("Next: P01"))["ticked"]
         enter(screen)
         screen.keys.press("p", "Control_L")
+        wait_for(eye, having("The gun is SIMULATED"))
+        screen.keys.press("s", "Control_L")
         said = wait_for(eye, having("no markers: no Lab Streaming Layer here (no pylsl): install the extra `lsl`"))
         assert any("The run was not begun: mend that, or untick" in text for text in said["texts"])
         screen.focus_on("start")  # a window that follows another has its texts before it has the keys

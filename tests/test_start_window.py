@@ -298,13 +298,14 @@ def test_what_cannot_be_read_is_said_when_the_window_opens_below_what_there_is_t
     assert "line 1: not a JSON record" in second
 
 
+@pytest.mark.parametrize("gun", ["simulated", SERIAL])
 @pytest.mark.parametrize("practice", [True, False])
 @pytest.mark.parametrize("halted", [True, False])
 def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_first(
-    practice: bool, halted: bool, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
+    halted: bool, practice: bool, gun: str, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What was typed, as “emergency stop practised”, is none."""
-    request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results, practice=practice)
+    """What was typed, as “emergency stop practised”, is none. A simulated gun owes nothing to the next on it."""
+    request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results, practice=practice, gun=gun)
     choices, told = [request, None], list[str]()
 
     def choose(_: StudyFolder, opening: Opening, __: object) -> RunRequest | None:
@@ -320,7 +321,8 @@ def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_fir
     monkeypatch.setattr(live, "run_live", stops)
     live.lab_day(request, (), lambda *_: nullcontext())
     assert "P01 stopped: emergency stop practised." in told[1]
-    assert told[1].endswith("begins with a test shot, and so does the next run on that gun.") is halted
+    assert ("Whatever they do next begins with a test shot" in told[1]) is halted
+    assert told[1].endswith(", and so does the next run on that gun.") is (halted and gun == SERIAL)
 
 
 @pytest.mark.parametrize("emptied", [True, False])
@@ -691,6 +693,22 @@ def test_escape_leaves_the_question(study: StudyFolder, opened: Open) -> None:
     assert window.isVisible()
 
 
+def test_what_was_said_goes_on_record_with_the_run_and_not_with_a_question_that_is_left(
+    study: StudyFolder, opened: Open
+) -> None:
+    do(study, "P01", records=40)
+    window = opened()
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert question(window).startswith("P01 stopped direction on ")
+    key(window, "Escape")
+    assert entries(study) == []
+    key(window, "Return", CTRL)
+    key(window, "G", CTRL)
+    assert window.choice is not None
+    assert entries(study) == [("joined", "P01")]
+
+
 # facts on record
 
 
@@ -810,12 +828,24 @@ def test_the_question_of_the_simulated_gun_comes_once_and_then_that_of_the_run(
     assert question(window).startswith("P01 stopped direction on ")
 
 
-def test_a_practice_and_a_training_need_no_question(study: StudyFolder, opened: Open) -> None:
-    practising = opened(gun="simulated")
-    fill(practising, "P01")
-    key(practising, "P", CTRL)
-    assert practising.choice is not None
-    assert (practising.choice.practice, practising.choice.training) == (True, False)
+def test_a_practice_on_a_simulated_gun_is_asked_about_before_anything_is_on_record(
+    study: StudyFolder, opened: Open
+) -> None:
+    window = opened(gun="simulated")
+    fill(window, "P01")
+    key(window, "P", CTRL)
+    assert question(window) == "The gun is SIMULATED: P01 will feel nothing. Practise all the same?"
+    key(window, "Escape")
+    assert window.choice is None
+    assert not read_register(study.results).members
+    key(window, "P", CTRL)
+    key(window, "S", CTRL)
+    assert window.choice is not None
+    assert (window.choice.practice, window.choice.training) == (True, False)
+    assert entries(study) == [("joined", "P01")]
+
+
+def test_a_training_needs_no_question(opened: Open) -> None:
     training = opened(gun="simulated")
     key(training, "R", CTRL)
     assert training.choice is not None
@@ -991,8 +1021,7 @@ def test_after_an_emergency_stop_of_a_test_shot_nothing_begins_before_one_was_fi
     assert window.shots.title.text() == "Fired"
     key(window, "Escape")
     key(window, begins, CTRL)
-    if begins == "Return":
-        key(window, "S", CTRL)  # simulated, all the same
+    key(window, "S", CTRL)  # simulated, all the same
     assert window.choice is not None
 
 

@@ -31,7 +31,7 @@ from experiments.screens.console import keys, people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
 from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of, noise_of
-from experiments.screens.console.start import choose_run
+from experiments.screens.console.start import SIMULATED, choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
@@ -162,6 +162,8 @@ def _stopped(choice: RunRequest, reason: str, *, halted: bool) -> str:
     if not halted:
         return _stopped_at(choice, reason)
     owed = phrase("Whatever they do next begins with a test shot, and so does the next run on that gun.")
+    if choice.gun == SIMULATED:  # what one person stopped on it is nobody else's
+        owed = phrase("Whatever they do next begins with a test shot.")
     return f"{_stopped_at(choice, reason)} {owed}"
 
 

@@ -250,30 +250,40 @@ class StartWindow(QtWidgets.QWidget):
     # choosing
 
     def _start(self) -> None:
-        if self._shot_is_owed():
-            return
-        if self._opening.gun == SIMULATED and not self._simulation_is_known:
-            if self._checked(lambda: enrolment.may_run(self._study, self.form.entered())[0]) is not None:
-                self._ask_simulation()  # before anything is on record: they may leave it
-            return
-        run = self._admit(practice=False)
+        """Nothing goes on record before all is answered that is asked: they may leave it."""
+        run = None if self._shot_is_owed() else self._allowed(practice=False)
         if run is None:
             return
-        if run.state == "in progress":
+        if self._asks_simulation:
+            self._ask_simulation(phrase("Start all the same?"), phrase("Start, simulated"), self._start)
+        elif run.state == "in progress":
             self._ask_resume(run)
-        else:
+        elif self._admit(practice=False) is not None:
             self._leave(self.form.participant_id)
 
     def _practice(self) -> None:
-        if not self._shot_is_owed() and self._admit(practice=True) is not None:
+        if self._shot_is_owed() or self._allowed(practice=True) is None:
+            return
+        if self._asks_simulation:
+            self._ask_simulation(phrase("Practise all the same?"), phrase("Practise, simulated"), self._practice)
+        elif self._admit(practice=True) is not None:
             self._leave(self.form.participant_id, practice=True)
 
     def _training(self) -> None:
         if not self._shot_is_owed() and self._checked(lambda: True):
             self._leave("training", practice=True, training=True)
 
-    def _admit(self, *, practice: bool) -> RunProgress | None:
+    @property
+    def _asks_simulation(self) -> bool:
+        return self._opening.gun == SIMULATED and not self._simulation_is_known
+
+    def _allowed(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
+        entered = self.form.entered()
+        return self._checked(lambda: enrolment.may_run(self._study, entered, practice=practice)[0])
+
+    def _admit(self, *, practice: bool) -> RunProgress | None:
+        """As `_allowed`, with what was said on record."""
         entered = self.form.entered()
         return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
 
@@ -293,18 +303,15 @@ class StartWindow(QtWidgets.QWidget):
         self._show_choice()
         self.say(reason, "bad")
 
-    def _ask_simulation(self) -> None:
+    def _ask_simulation(self, asked: str, sure: str, go_on: Callable[[], None]) -> None:
         def known(_: str) -> None:
             self._simulation_is_known = True
-            self._start()
+            go_on()
 
-        text = phrase(
-            "The gun is SIMULATED: {participant_id} will feel nothing. Start all the same?",
-            participant_id=self.form.participant_id,
-        )
-        self._ask(
-            QuestionBox(text, (Option(text=phrase("Start, simulated"), key="Ctrl+S", do=known), self._leave_it()))
-        )
+        code = self.form.participant_id
+        text = phrase("The gun is SIMULATED: {participant_id} will feel nothing.", participant_id=code)
+        options = (Option(text=sure, key="Ctrl+S", do=known), self._leave_it())
+        self._ask(QuestionBox(f"{text} {asked}", options))
 
     def _ask_resume(self, run: RunProgress) -> None:
         answers = (
