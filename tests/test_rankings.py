@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from experiments.design.planning import plan_of
 from experiments.load import load_gun, shipped_folder
+from experiments.screens.texts import saved_text
 from experiments.session import events
 from experiments.session.judging import Moment, event_refusal, exchanged, meant
 from experiments.session.remarks import EntryCorrected
@@ -55,7 +56,9 @@ def test_every_trial_of_a_set_is_asked_for_its_place_and_told_what_the_first_mea
 def test_a_rank_is_given_once_in_a_set() -> None:
     first, second, third, *next_set = ASKED
     assert refused(2.0, first) == ""
-    assert "2 was given to another one of this set" in refused(2.0, second, said(2.0, first))
+    refusal = refused(2.0, second, said(2.0, first))
+    assert "2 was given to another one of this set" in refusal
+    assert refusal.endswith("; undo corrects that one first.")
     assert refused(1.0, third, said(2.0, first), said(3.0, second)) == ""
     assert refused(2.0, next_set[0], said(2.0, first)) == ""
 
@@ -87,6 +90,19 @@ def test_a_rank_that_is_corrected_to_another_trials_exchanges_the_two() -> None:
     taken = EntryCorrected(trial=third.trial, question="rank", value=1.0)
     assert corrected(3.0, first, *all_three) == (events.Correct(value=3.0), taken)
     assert corrected(3.0, first, *all_three[:2]) == (events.Correct(value=3.0), None)
+
+
+def test_that_two_ranks_were_exchanged_is_said_of_both_in_one_line() -> None:
+    """The console keeps the last line alone, which named the other trial only."""
+    first, second, third, *_ = ASKED
+    asked = EntryCorrected(trial=first.trial, question="rank", value=3.0)
+    taken = EntryCorrected(trial=third.trial, question="rank", value=1.0)
+    all_three = said(1.0, first), said(2.0, second), said(3.0, third)
+    exchange = saved_text(PLAN, (*all_three, (None, asked), (None, taken)), None, taken)
+    assert exchange == "Saved. The two ranks were exchanged: Trial 1 of 3 has 3 now, Trial 3 of 3 has 1."
+    again = EntryCorrected(trial=second.trial, question="rank", value=1.0)
+    told = (*all_three[:2], (None, asked), (None, again))
+    assert saved_text(PLAN, told, None, again) == "Saved. Trial 2 of 3 corrected to 1."
 
 
 def test_a_correction_is_kept_to_the_grain_as_what_was_entered() -> None:

@@ -14,7 +14,15 @@ from experiments.design.language import LARGEST_NUMBER, shown_level
 from experiments.design.plan import Plan, Trial
 from experiments.screens.phrases import isolated, phrase
 from experiments.session import remarks, steps
-from experiments.session.history import History, answered, asked_before, entered_value, is_attempt, of_one_set
+from experiments.session.history import (
+    History,
+    answered,
+    asked_before,
+    entered_value,
+    exchanged_for,
+    is_attempt,
+    of_one_set,
+)
 from experiments.session.remarks import MAX_FLAG, Remark
 from experiments.session.steps import Ask, Asking, Describe, Outcome, Prepare, Rate, Step, trial_of, what
 from experiments.study.enrolment import CodeDoubt
@@ -276,8 +284,16 @@ def _corrected_text(plan: Plan, told: History, remark: remarks.EntryCorrected) -
     if isinstance(entry, Describe):
         name = entry_name(told, entry)
         return phrase("Saved. {about}: {entry} corrected.", about=about_text(plan, entry), entry=name)
-    about = _which(plan, told, entry)
-    return phrase("Saved. {about} corrected to {value}.", about=about, value=value_text(entry, remark.value))
+    about, value = _which(plan, told, entry), value_text(entry, remark.value)
+    if (first := exchanged_for(told, remark)) is not None and (given := asked_before(told, first)) is not None:
+        return phrase(
+            "Saved. The two ranks were exchanged: {one} has {rank} now, {other} has {was}.",
+            one=_which(plan, told, given),
+            rank=value_text(given, first.value),
+            other=about,
+            was=value,
+        )
+    return phrase("Saved. {about} corrected to {value}.", about=about, value=value)
 
 
 def shots_text(count: int) -> str:

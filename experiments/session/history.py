@@ -193,6 +193,17 @@ def ranks_of_others(history: History, asked: steps.Rate) -> dict[AnswerValue, st
     return {value: one for one in others if (value := entered_value(history, one)) is not None}
 
 
+def exchanged_for(history: History, taken: EntryCorrected) -> EntryCorrected | None:
+    """The correction to a rank that another trial had, where `taken` is that other's, corrected along with it."""
+    at = next((place for place, (_, word) in enumerate(history) if word is taken), 0)
+    before, first = history[: max(at - 1, 0)], history[at - 1][1] if at else None
+    asked = asked_before(before, first) if isinstance(first, EntryCorrected) else None
+    if not isinstance(first, EntryCorrected) or not isinstance(asked, steps.Rate):
+        return None
+    had_it = ranks_of_others(before, asked).get(first.value)
+    return first if had_it is not None and had_it.trial == taken.trial else None
+
+
 def _value(step: steps.Step | None, word: steps.Outcome | Remark, asked: Asking) -> tuple[AnswerValue] | None:
     if isinstance(word, EntryCorrected):
         return (word.value,) if (word.trial, word.question) == (asked.trial, asked.question) else None

@@ -265,7 +265,7 @@ def _taken(moment: Moment, rank: float | None) -> str:
     rank = on_scale(rank, asked)
     if rank not in ranks_of_others(moment.history, asked):
         return ""
-    return f"{rank:g} was given to another one of this set: each has a rank of its own."
+    return f"{rank:g} was given to another one of this set: each has a rank of its own; undo corrects that one first."
 
 
 def _is_choice(moment: Moment, response: str) -> bool:
