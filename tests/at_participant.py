@@ -106,6 +106,14 @@ class Hands:
         x, y = int(left * WIDTH), int(top * HEIGHT)
         return bytes(self._root.get_image(x, y, WIDTH - x, HEIGHT - y, self._X.ZPixmap, 0xFFFFFFFF).data)
 
+    def is_drawn_on(self, left, top, right, bottom):
+        """Whether the display shows more than one colour between places, in parts of the screen."""
+        x, y, width, height = (
+            int(part) for part in (left * WIDTH, top * HEIGHT, (right - left) * WIDTH, (bottom - top) * HEIGHT)
+        )
+        data = bytes(self._root.get_image(x, y, width, height, self._X.ZPixmap, 0xFFFFFFFF).data)
+        return data != data[:4] * (len(data) // 4)
+
     def settled(self, *where):
         """What `seen` shows once nothing changes any more."""
         seen = None

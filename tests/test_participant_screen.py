@@ -71,6 +71,21 @@ def test_nothing_is_confirmed_before_there_is_a_marker(ask, hands):
     assert answer.result(PATIENCE_S).rating == 10.0  # neither none, nor the middle
 
 
+def test_each_place_of_a_ranking_has_its_number_and_a_cross_above_it_where_another_one_has_it(ask, hands, link):
+    ranking = replace(SCALE, minimum=1.0, maximum=3.0, minimum_text="most", maximum_text="", grain=1.0, distinct=True)
+    across = [LEFT_END + (RIGHT_END - LEFT_END) * part for part in (0, 0.5, 1)]
+    for taken, crosses in (((), [False, False, False]), ((2.0, 3.0), [False, True, True])):
+        answer = ask(replace(ranking, taken=taken))
+        hands.settled()
+        seen = [
+            [hands.is_drawn_on(x - 0.03, 0.46, x + 0.03, 0.53) for x in across],
+            [hands.is_drawn_on(x - 0.01, 0.61, x + 0.01, 0.66) for x in across],
+        ]
+        type_on(hands, "Home", "Return")
+        assert answer.result(PATIENCE_S).rating == 1.0
+        assert seen == [crosses, [True, True, True]]
+
+
 def test_a_scale_is_answered_by_keys_alone(ask, hands):
     answer = ask(SCALE)
     for name in ("Right", "Right", "Right", "Left", "Next", "KP_Enter"):  # to the middle, then by grains, then by ten

@@ -303,6 +303,7 @@ class ParticipantSide:
                     minimum_text=step.minimum_text,
                     maximum_text=step.maximum_text,
                     grain=step.grain,
+                    distinct=step.distinct,
                     taken=self._taken(step),
                     draft=position.number,
                 ),

@@ -48,7 +48,7 @@ class AskRating:
     """Ask for a rating of one of several stimuli, named by its order of presentation.
 
     Asked again with the same `draft`, it begins with the marker where it stood; so does a description with its words.
-    `taken`: ratings that were given to others, where each has one of its own, as ranks are.
+    `distinct`: each has one of its own, as ranks are; `taken`: those that were given to others.
     """
 
     number: int
@@ -59,6 +59,7 @@ class AskRating:
     minimum_text: str
     maximum_text: str
     grain: _Positive
+    distinct: bool = False
     taken: tuple[_Finite, ...] = ()
     draft: int = 0
     ask: int = 0

@@ -149,6 +149,7 @@ def move(scale: messages.AskRating, rating: float | None, step: Move) -> float:
 
 
 _SCALE_Y = -0.06
+_CROSS_Y = 0.005
 _LENGTH = 0.76
 """The scale's, as a part of the page's width."""
 _REACH = 0.06
@@ -193,7 +194,7 @@ class RatingPage(Page):
         self._slider = self._scale()
         said = stage.look.messages
         self._button = Button(stage, said.confirm)
-        self._drawn = [*heading(stage, asked), *self._ends()]
+        self._drawn = [*heading(stage, asked), *self._numbers(), *self._ends()]
         self._hints = {False: hint(stage, said.rating_how), True: hint(stage, said.rating_taken)}
 
     def moves(self) -> float | None:
@@ -263,7 +264,7 @@ class RatingPage(Page):
         colors = self._stage.palette
         return self._stage.toolkit.visual.Slider(
             self._stage.window,
-            ticks=(self._asked.minimum, self._asked.maximum),
+            ticks=self._places(),
             pos=(0, _SCALE_Y),
             size=(2 * self._half, 0.05),
             units="height",
@@ -276,17 +277,31 @@ class RatingPage(Page):
             labelColor=colors.ink,
         )
 
-    def _ends(self) -> list[Any]:
-        """Number and words under each end, the words no wider than twice the way to the window's edge."""
-        width, ink = 2 * (self._stage.half_width - self._half), self._stage.palette.ink
+    def _places(self) -> list[float]:
+        """What has a number: the ends of a scale, every one of the ranks."""
+        low, high, grain = self._asked.minimum, self._asked.maximum, self._asked.grain
+        if not self._asked.distinct or low == high:
+            return [low, high]
+        return [low + grain * n for n in range(round((high - low) / grain) + 1)]
+
+    def _numbers(self) -> list[Any]:
+        """The numbers below the line, and a cross above it where another one has the place: a shape, not only a hue."""
+        places, colors = self._places(), self._stage.palette
+        width = min(2 * self._half / (len(places) - 1), 2 * (self._stage.half_width - self._half))
         drawn = []
-        for x, number, words in (
-            (-self._half, self._asked.minimum, self._asked.minimum_text),
-            (self._half, self._asked.maximum, self._asked.maximum_text),
-        ):
-            drawn.append(self._stage.text(f"{number:g}", TextBox(x=x, y=-0.105, width=width, height=0.06), 0.04, ink))
-            drawn.append(self._stage.text(words, TextBox(x=x, y=-0.155, width=width, height=0.12), 0.04, ink))
+        for number in places:
+            x = self._half * (2 * (number - places[0]) / (places[-1] - places[0] or 1.0) - 1)
+            is_taken = number in self._asked.taken
+            box = TextBox(x=x, y=-0.105, width=0.9 * width, height=0.06)
+            drawn.append(self._stage.text(f"{number:g}", box, 0.04, colors.muted if is_taken else colors.ink))
+            drawn += [self._stage.cross(x, _CROSS_Y, 0.04, colors.ink)] if is_taken else []
         return drawn
+
+    def _ends(self) -> list[Any]:
+        """The words under each end, no wider than twice the way to the window's edge."""
+        width, ink = 2 * (self._stage.half_width - self._half), self._stage.palette.ink
+        ends = ((-self._half, self._asked.minimum_text), (self._half, self._asked.maximum_text))
+        return [self._stage.text(said, TextBox(x=x, y=-0.155, width=width, height=0.12), 0.04, ink) for x, said in ends]
 
 
 MOST_CHARACTERS = 1_000

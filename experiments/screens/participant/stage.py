@@ -219,6 +219,12 @@ class Stage:
             lineWidth=2,
         )
 
+    def cross(self, x: float, y: float, size: float, color: str) -> Any:
+        """A cross of two diagonal strokes with its middle at a place."""
+        return self.toolkit.visual.ShapeStim(
+            self.window, vertices="cross", ori=45, size=size, pos=(x, y), fillColor=color, lineColor=None
+        )
+
     def close(self) -> None:
         """Close the window."""
         self.focus.give_back()
