@@ -84,6 +84,14 @@ def test_a_later_joined_record_corrects_the_facts_and_keeps_the_day(results: Pat
     assert found.members["P01"].joined_utc == found.entries[0][0]
 
 
+def test_who_joins_with_the_facts_on_record_is_not_written_again(results: Path) -> None:
+    before = lines_of(results)
+    append(results, joined("P01", age_years=26), VirtualClock())
+    assert lines_of(results) == before
+    append(results, joined("P01"), VirtualClock())  # a correction back is one
+    assert len(lines_of(results)) == len(before) + 1
+
+
 def test_the_last_exclusion_or_readmission_counts(results: Path) -> None:
     assert read_register(results).excluded() == {}
     append(results, entry("excluded", "P02", reason="left for good"), VirtualClock())
@@ -268,6 +276,16 @@ def test_consoles_that_write_at_once_neither_lose_nor_tear_a_record(tmp_path: Pa
     for name in "ABCD":
         own = [one.participant_id for _, one in found.entries if one.participant_id.startswith(name)]
         assert own == [f"{name}{number:02d}" for number in range(20)]
+
+
+@pytest.mark.slow
+def test_somebody_who_joins_at_several_consoles_at_once_is_on_record_once(tmp_path: Path) -> None:
+    consoles = [appending(tmp_path / "results", "A", 20) for _ in range(3)]
+    for console in consoles:
+        _, said = console.communicate(timeout=PATIENCE_S)
+        assert (console.returncode, said) == (0, "")
+    found = read_register(tmp_path / "results")
+    assert [one.participant_id for _, one in found.entries] == [f"A{number:02d}" for number in range(20)]
 
 
 @pytest.mark.slow

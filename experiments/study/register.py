@@ -202,12 +202,17 @@ def _refuse_problem(register: Register) -> None:
 
 
 def append(results: Path, one: RegisterEntry, clock: Clock) -> None:
-    """Add a record and return when it is on the disk. `RegisterError` if it cannot be: then nothing was added."""
+    """Add a record and return when it is on the disk. `RegisterError` if it cannot be: then nothing was added.
+
+    Nor is it if somebody joins whom another console has taken in with the same facts meanwhile.
+    """
     path = results / REGISTER_FILE
     with _held(path) as descriptor:
         before = read_register(results)
         _refuse_problem(before)
         _refuse_twin(before, one)
+        if _is_known(before, one):
+            return
         os.ftruncate(descriptor, before.whole_bytes)  # what was cut off was never acknowledged
         head = {"n": len(before.entries), "link": before.link, "utc": clock.utc()}
         _write(path, descriptor, canonical_json(head | one.model_dump(mode="json")) + b"\n", before.whole_bytes)
@@ -220,6 +225,11 @@ def _refuse_twin(before: Register, one: RegisterEntry) -> None:
                 f"participant code {one.participant_id!r} differs from {known!r} in {before.path} in case alone; "
                 f"use {known!r} if it is the same person, else another code"
             )
+
+
+def _is_known(before: Register, one: RegisterEntry) -> bool:
+    member = before.members.get(one.participant_id)
+    return isinstance(one, Joined) and member is not None and member.facts == one.facts
 
 
 def _write(path: Path, descriptor: int, line: bytes, length: int) -> None:
