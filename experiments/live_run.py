@@ -125,6 +125,7 @@ class LiveRun:
         self.disarming: list[threading.Thread] = []
         self.halted = self.halt_unsaved = self.correction_unsaved = False
         self._answer_unsaved = ""
+        self._lost_halt: Halted | None = None
         self.beats, self._to_fire_s = Beats(clock.now), math.inf
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
@@ -385,6 +386,7 @@ class LiveRun:
             self.halt_unsaved = self.halt_unsaved and not isinstance(kept[0], OF_HALT)
             for remark in kept:
                 self._screen.acknowledge(None, remark)
+            self._write_halt_again()
         elif isinstance(error, JournalGone):  # it is where the journal is now
             self._screen.trouble(str(error))
             self.offer(events.ResultsGone(cause=str(error)))
@@ -394,10 +396,16 @@ class LiveRun:
             if corrected:  # what comes next may follow from it, and would from nothing on record
                 self.offer(events.ResultsGone(cause=CORRECTION_UNSAVED))
 
+    def _write_halt_again(self) -> None:
+        """A record was written: there is room for the emergency stop that the disk refused."""
+        halt, self._lost_halt = self._lost_halt, None
+        if halt is not None and self.halt_unsaved:
+            self.remark(halt)
+
     def _lost(self, remark: Remark) -> str:
         """What there is to say of a remark that the disk refused."""
         if isinstance(remark, Halted):
-            self.halt_unsaved = True
+            self.halt_unsaved, self._lost_halt = True, remark
             return HALT_UNSAVED
         if isinstance(remark, EntryCorrected):
             self.correction_unsaved = True

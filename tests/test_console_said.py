@@ -8,8 +8,10 @@ import pytest
 
 from experiments.clock import VirtualClock
 from experiments.design import planning
+from experiments.live_run import HALT_UNSAVED
 from experiments.load import load_setup
 from experiments.screens.console.view import About, Saved, Trouble
+from experiments.session.remarks import Halted, Noted
 from experiments.session.steps import Answered, Failed, FireShot, Prepare, Prepared
 from tests.asked import ask
 
@@ -59,3 +61,14 @@ def test_that_something_is_well_again_does_not_come_back_after_a_refusal(window:
     window.clock.sleep(5.0)
     window.refresh()
     assert window.saved.text() == ""
+
+
+def test_what_the_disk_refused_of_an_emergency_stop_is_said_until_it_is_on_record(window: Any) -> None:
+    stop = Saved(step=None, word=Halted(by="experimenter"))
+    window.take(Trouble(text=f"journal: no space. {HALT_UNSAVED}"))
+    window.take(Saved(step=None, word=Noted(trial=PLAN.trials[0], text="room was made")))
+    window.take(stop)
+    assert window.saved.text() == "Saved. The emergency stop is on record now."
+    window.take(Trouble(text="The gun does not say that it is disarmed"))
+    window.take(stop)
+    assert window.saved.text() == "The gun does not say that it is disarmed"

@@ -12,7 +12,7 @@ from PyQt6.QtCore import QCoreApplication, QEvent, QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 
 from experiments.clock import Clock
-from experiments.live_run import LiveRun
+from experiments.live_run import HALT_UNSAVED, LiveRun
 from experiments.record.tables import is_simulated
 from experiments.screens.console import view, widgets, windows
 from experiments.screens.console.buttons import Buttons
@@ -28,7 +28,7 @@ from experiments.screens.texts import saved_text
 from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
-from experiments.session.remarks import Noted
+from experiments.session.remarks import Halted, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Failed, Prepared, Rested, trial_of
 from experiments.session.tracks import Tracks, adaptive_tracks
@@ -225,6 +225,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             self._last(text, "bad" if self._failure or self._beside else "good")
         elif self._lasting == (self._failure, "bad") and isinstance(message.word, Prepared):
             self._last("", "good")  # it is fired anew: of that a failure before says nothing
+        elif HALT_UNSAVED in self._lasting[0] and isinstance(message.word, Halted):
+            self._last(phrase("Saved. The emergency stop is on record now."), "good")
         if isinstance(message.word, Rested):
             windows.play_tone()
 
