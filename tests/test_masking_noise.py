@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.screens.participant.noise import NOISE_ROUND, NoiseLoop
+from experiments.screens.participant.noise import NOISE_ROUND, NoiseLoop, Silence
 from tests.waiting import wait_for
 
 
@@ -21,6 +21,20 @@ def test_blocks_of_any_length_join_without_a_gap_from_round_to_round(frames: int
     joined = np.concatenate([loop.block(frames) for _ in range(count)])
     assert np.array_equal(joined, np.resize(whole, joined.shape))
     assert 0.49 < np.abs(whole).max() <= 0.5
+
+
+def test_a_device_that_takes_nothing_any_more_is_silent_but_not_after_a_standstill_of_this_program() -> None:
+    now_s, blocks = 100.0, 0
+    silence = Silence(lambda: now_s)
+    for _ in range(100):
+        now_s, blocks = now_s + 1.0, blocks + 1
+        assert not silence.lasts(blocks)
+    now_s += 60.0  # all stood still, and this is asked before the device has taken the next block
+    assert not silence.lasts(blocks)
+    looks = 0
+    while not silence.lasts(blocks):
+        now_s, looks = now_s + 1.0, looks + 1
+    assert looks == 2  # of a second each, beside what the standstill counts for
 
 
 _PLAYS = """

@@ -336,7 +336,7 @@ def test_nobody_begins_anew_where_the_results_folder_is_gone(emptied: bool, open
     for _ in range(2):
         key(window, "Return", CTRL)
         assert window.choice is None
-        assert "all who were in it are gone (1)" in said(window)
+        assert "all that was in it is gone" in said(window)
         key(window, "P", CTRL)
         assert window.choice is None
     assert not list(study.results.glob("*"))
@@ -358,17 +358,56 @@ def test_nobody_begins_anew_either_where_the_results_folder_went_while_they_ran(
     do(study, "P01", records=20)
     study.results.rename(study.results.with_name("away"))
     window = opened(**opening)
-    assert "all who were in it are gone (1)" in said(window)
+    assert "all that was in it is gone" in said(window)
     fill(window, "P02")
     key(window, "Return", CTRL)
     assert window.choice is None
     assert not study.results.exists()
 
 
-def test_f12_is_said_to_be_heard_where_nothing_is_armed(opened: Open) -> None:
+def test_somebody_whose_logs_are_gone_does_not_begin_anew(opened: Open, study: StudyFolder) -> None:
+    for code in ("P01", "P02"):
+        join(study, code)
+        do(study, code, records=20)
     window = opened()
-    key(window, "F12")
+    folder = study.results / "sub-P01"
+    folder.rename(away := study.results.parent / "away")
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert window.choice is None
+    assert f"{folder.resolve()}: was there, and is gone" in said(window)
+    assert not folder.exists()
+    fill(window, "P02")
+    key(window, "Return", CTRL)
+    assert "Go on there, or set it aside" in question(window)
+    away.rename(folder)
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert "Go on there, or set it aside" in question(window)
+
+
+HELD = [(), (CTRL,), (ALT,), (Qt.KeyboardModifier.ShiftModifier,), (CTRL, ALT)]
+
+
+@pytest.mark.parametrize("held", HELD)
+def test_f12_is_said_to_be_heard_where_nothing_is_armed(held: tuple[Qt.KeyboardModifier, ...], opened: Open) -> None:
+    window = opened()
+    key(window, "F12", *held)
     assert said(window) == NOTHING_ARMED
+
+
+@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize("name", ["F12", "Escape"])
+def test_whatever_is_held_a_test_shot_is_stopped_and_called_off(
+    name: str, held: tuple[Qt.KeyboardModifier, ...], opened: Open
+) -> None:
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, name, *(held if name == "F12" else held[:1]))
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == {"F12": "EMERGENCY STOP", "Escape": "Not fired"}[name]
+    assert window.shots.owed is (name == "F12")
 
 
 # starting

@@ -392,7 +392,7 @@ def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp
     assert [one["kind"] for one in journal_of(tmp_path) if one["kind"] == "stopped"] == ["stopped"]
 
 
-@pytest.mark.parametrize("typed", ["fo!", "stop!", "\x1b[24~", "note it\x1b[24~"])
+@pytest.mark.parametrize("typed", ["fo!", "stop!", "\x1b[24~", "note it\x1b[24~", "\x1b[24;5~", "stop\x1b[24;2~"])
 def test_what_was_half_typed_does_not_swallow_an_emergency_stop(
     typed: str, quick_configs: Path, tmp_path: Path
 ) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 import threading
 import time
@@ -45,8 +46,8 @@ _HALTED = (
 )
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S, _BEAT_S = 1.0, 0.1
-_F12 = "[24~"
-"""What is left on a line of the console's key for an emergency stop."""
+_F12 = re.compile(r"\[24(;\d+)?~")
+"""What is left on a line of the console's key for an emergency stop; behind a semicolon stands what is held beside."""
 
 
 class TerminalScreen:
@@ -214,7 +215,7 @@ class TerminalScreen:
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
         """The event that a line means there, or what to say about it."""
-        if line.startswith("!") or _F12 in line:
+        if line.startswith("!") or _F12.search(line):
             return events.EmergencyStop()
         word, _, rest = line.removeprefix("/").partition(" ")
         word = word.lower()

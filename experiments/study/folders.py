@@ -7,7 +7,7 @@ begins just then has patience; so looking never stands in the way of a run.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -82,6 +82,26 @@ def known_codes(results: Path, registered: Register) -> list[str]:
     """The participants who have a folder, or stand in the register as far as it can be trusted."""
     folders = {path.name.removeprefix("sub-") for path in results.glob("sub-*") if path.is_dir()}
     return sorted(folders | set(registered.members))
+
+
+def files_of_people(results: Path) -> set[Path]:
+    """The register of a results folder and the folders of its participants."""
+    return {path for path in (results / register.REGISTER_FILE, *results.glob("sub-*")) if path.exists()}
+
+
+def refuse_gone(results: Path, had: Collection[Path], participant_id: str) -> None:
+    """`PlaceError` if all `files_of_people` that a folder had are gone, or somebody's own: they would begin anew."""
+    gone, own = [path for path in had if not path.exists()], results / f"sub-{participant_id}"
+    if gone and len(gone) == len(had):
+        raise PlaceError(
+            f"{results.resolve()}: all that was in it is gone: it was moved, or its disk is away. Put it back; or "
+            "quit, and start Recoil again, to begin with nobody"
+        )
+    if own in gone:
+        raise PlaceError(
+            f"{own.resolve()}: was there, and is gone: {participant_id} would begin anew. Put it back; or quit, and "
+            "start Recoil again, if they are to"
+        )
 
 
 def set_aside(run: Place) -> list[Path]:

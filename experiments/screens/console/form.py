@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import get_args
 
 from PyQt6 import QtWidgets
@@ -193,7 +194,7 @@ class Opening:
 
     `named` is the experiment whose config was named when the program was started; later windows have none.
     `language` is the code of one of the `languages`; `sensor` and `markers` are as of a `RunRequest`. `had` grows from
-    window to window by whoever was seen in the results folder.
+    window to window by the files of people that were seen in the results folder.
     """
 
     gun: str
@@ -205,7 +206,7 @@ class Opening:
     markers: bool = False
     participant_id: str = ""
     said: str = ""
-    had: set[str] = field(default_factory=set)
+    had: set[Path] = field(default_factory=set)
 
 
 class PeopleTable(QtWidgets.QTableWidget):

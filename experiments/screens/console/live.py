@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from PyQt6.QtCore import QEventLoop, Qt, QTimer
-from PyQt6.QtGui import QGuiApplication, QKeySequence, QShortcut
+from PyQt6.QtGui import QGuiApplication
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
 from device.messages import RecoilError
@@ -27,7 +27,7 @@ from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
 from experiments.run import Finished
 from experiments.run_request import Again, RunRequest
-from experiments.screens.console import keys, people, widgets
+from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
 from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of, noise_of
@@ -35,7 +35,7 @@ from experiments.screens.console.start import SIMULATED, choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
-from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
+from experiments.screens.console.windows import FreshShortcuts, StopKey, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
@@ -312,9 +312,12 @@ def while_shown(text: str, make: Callable[[], Made], emergency: Callable[[], Non
     shown.setWindowTitle("Recoil – please wait")
     shown.setStyleSheet(f"{widgets.sheet('dark')} QLabel {{ font-size: 26px; padding: 40px; }}")
     shown.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    stop = QShortcut(QKeySequence(keys.BY_NAME["emergency"].key), shown)
-    stop.activated.connect(lambda: shown.setText(phrase("EMERGENCY STOP")))
-    stop.activated.connect(emergency)
+
+    def stop() -> None:
+        shown.setText(phrase("EMERGENCY STOP"))
+        emergency()
+
+    StopKey(shown, stop)
     made: Future[Made] = Future()
 
     def work() -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from PyQt6.QtCore import Qt, pyqtSignal
+from PyQt6.QtGui import QKeySequence, QShortcut
 from PyQt6.QtWidgets import QVBoxLayout, QWidget
 
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
@@ -97,6 +98,8 @@ class ShotCheck:
             text, mood = self._with_gun()
         except (DeviceError, ValueError) as error:
             text = phrase("Test shot of {label}: {error}", label=self._label, error=error)
+            if self._latched.is_set():
+                text = f"{text}. {state_text(None)[0]}"
         finally:
             self._tell(ShotProgress(phase="over", fired=self._report is not None, text=text, mood=mood))
 
@@ -234,6 +237,8 @@ class ShotPage(QWidget):
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
+        for held in ("Ctrl", "Shift", "Alt"):  # as the hand may have them still that began it
+            QShortcut(QKeySequence(f"{held}+Esc"), self).activated.connect(self.call_off)
         self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
         self.stop_button = widgets.button(self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop")
         down = widgets.fill(QVBoxLayout(self), self.title, self.detail, self.count)

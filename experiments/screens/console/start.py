@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import QEvent, QEventLoop, pyqtSignal
-from PyQt6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
+from PyQt6.QtGui import QCloseEvent, QResizeEvent
 
 from device.messages import RecoilError
 from experiments.clock import Clock
@@ -24,8 +24,15 @@ from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, Question
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
-from experiments.study.folders import Overview, PlaceError, StudyFolder, known_codes, overview, read_anew
-from experiments.study.register import read_register
+from experiments.study.folders import (
+    Overview,
+    PlaceError,
+    StudyFolder,
+    files_of_people,
+    overview,
+    read_anew,
+    refuse_gone,
+)
 from experiments.study.study import Participant, RunProgress
 
 _NAME = "start"
@@ -99,7 +106,6 @@ class StartWindow(QtWidgets.QWidget):
         grid.addWidget(button(phrase("Quit"), "Ctrl+Q", self.close), 0, 4, 2, 1)
         for column, stretch in enumerate((3, 2, 2, 2, 1)):
             grid.setColumnStretch(column, stretch)
-        QShortcut(QKeySequence("F12"), page).activated.connect(lambda: self.say(NOTHING_ARMED, "ask"))
         return grid
 
     def _connect(self) -> None:
@@ -109,6 +115,7 @@ class StartWindow(QtWidgets.QWidget):
         self.form.experiment_edited.connect(self._show_choice)
         self.shots.left.connect(self._leave_shots)
         self.shots.over = self._shot_over
+        windows.StopKey(self, self._emergency_stop)
 
     # showing
 
@@ -121,16 +128,12 @@ class StartWindow(QtWidgets.QWidget):
             unread += str(error).splitlines()
         seen = overview(self._study)
         self._seen: Overview = replace(seen, problems=tuple(dict.fromkeys([*unread, *seen.problems])))
-        self._opening.had.update(one.participant_id for one in self._seen.participants)
+        self._opening.had.update(files_of_people(self._study.results))
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
 
     def _read_anew(self) -> None:
-        """Have the study as its files are now.
-
-        `ConfigError`; `PlaceError`, if this window's fields are another's, or all who were in the results folder are
-        gone: who went on there would begin anew.
-        """
+        """Have the study as its files are now. `ConfigError`; `PlaceError`: other fields, or as `refuse_gone`."""
         before, now = self._study, read_anew(self._study)
         fields = [(one.experiments, one.config.experiments, one.config.eligibility.ask) for one in (before, now)]
         if fields[0] != fields[1]:
@@ -141,16 +144,8 @@ class StartWindow(QtWidgets.QWidget):
                     source=before.source,
                 )
             )
-        self._study, results = now, now.results
-        if self._opening.had and not known_codes(results, read_register(results)):
-            raise PlaceError(
-                phrase(
-                    "{results}: all who were in it are gone ({count}): it was moved, or its disk is away. Put it back; "
-                    "or quit, and start Recoil again, to begin with nobody",
-                    results=results.resolve(),
-                    count=len(self._opening.had),
-                )
-            )
+        self._study = now
+        refuse_gone(now.results, self._opening.had, self.form.participant_id)
 
     def _say_first(self, opening: Opening) -> None:
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
@@ -343,7 +338,7 @@ class StartWindow(QtWidgets.QWidget):
         self, code: str, *, again: Again = "ask", reason: str = "", practice: bool = False, training: bool = False
     ) -> None:
         if self.choice is None:
-            self._opening.had.update([] if training else [code])
+            self._opening.had.update(files_of_people(self._study.results))
             self.choice = RunRequest(
                 setup=self._setup(),
                 participant_id=code,
@@ -423,6 +418,12 @@ class StartWindow(QtWidgets.QWidget):
             self.pages.setCurrentWidget(self.shots)
             self.shots.enter()
             self.shots.begin()
+
+    def _emergency_stop(self) -> None:
+        if self.pages.currentWidget() is self.shots:
+            self.shots.emergency_stop()
+        else:
+            self.say(NOTHING_ARMED, "ask")
 
     def _shot_over(self) -> None:
         if self._closing:

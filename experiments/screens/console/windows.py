@@ -324,6 +324,25 @@ class FreshShortcuts(QtCore.QObject):
         return key == self._stale
 
 
+class StopKey(QtCore.QObject):
+    """Has F12 act in a window whatever else is held: a shortcut is not pressed for Qt where Ctrl is down beside it."""
+
+    def __init__(self, window: QWidget, act: Callable[[], object]) -> None:
+        super().__init__(window)
+        self._act = act
+        window.installEventFilter(self)
+
+    def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
+        """Take F12 before it is looked for among the shortcuts, and as it is pressed."""
+        del watched
+        if not isinstance(event, QKeyEvent) or event.key() != QtCore.Qt.Key.Key_F12:
+            return False
+        if event.type() == QtCore.QEvent.Type.KeyPress and not event.isAutoRepeat():
+            self._act()
+        event.accept()
+        return True
+
+
 def _may_be_shortcut(event: QKeyEvent) -> bool:
     """Whether a key is no text, nor moves within it."""
     held = event.modifiers() & (QtCore.Qt.KeyboardModifier.ControlModifier | QtCore.Qt.KeyboardModifier.AltModifier)

@@ -27,19 +27,26 @@ class Focus:
             xlib_window.XkbSetDetectableAutoRepeat(window._x_display, 1, byref(c_int()))
 
     def take(self) -> None:
-        """Take the keys, and keep in mind whose they were."""
+        """Take the keys and come to the front, and keep in mind whose they were."""
         holder = self._holder()
         if holder not in (None, self._ours):
             self._lender = holder or 0
         self._window.activate()
+        self._raise(self._ours)
 
     def give_back(self) -> None:
-        """Let the lender have the keys again, if nobody has taken them since."""
+        """Let the lender have the keys and the front again, if nobody has taken them since."""
         if self._lender > _NO_WINDOW and self._holder() == self._ours:
             xlib = _xlib()
             xlib.XSetInputFocus(self._window._x_display, self._lender, xlib.RevertToParent, xlib.CurrentTime)
-            xlib.XFlush(self._window._x_display)
+            self._raise(self._lender)
         self._lender = 0
+
+    def _raise(self, window: int | None) -> None:
+        """On one screen one of the two windows lies upon the other: whoever has the keys is to see theirs."""
+        if self._on_x:
+            _xlib().XRaiseWindow(self._window._x_display, window)
+            _xlib().XFlush(self._window._x_display)
 
     def find_held(self) -> None:
         """Have pyglet know the keys that were down as the window got the keys: it takes their repeats for presses.

@@ -6,12 +6,16 @@ without a word (2026.2.5).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+from device.machine_clock import machine_s
 from experiments.screens.participant import messages
 
 NOISE_ROUND = 441_000
 """Samples until it begins again: some ten seconds, by the rate that the device has."""
+SILENT_S, _LOOK_S = 3.0, 1.5
+"""So long a device may take nothing; and what a look counts for at most: the program may have stood still before it."""
 _SEED = 20_240  # assumed; any will do, and the same noise for everybody
 
 
@@ -20,6 +24,8 @@ class MaskingNoise:
 
     def __init__(self) -> None:
         self._stream: Any = None
+        self._loop: NoiseLoop | None = None
+        self._silence = Silence()
 
     def turn(self, asked: messages.Noise) -> messages.NoiseIs:
         """Turn it on or off."""
@@ -27,7 +33,8 @@ class MaskingNoise:
         if not asked.on:
             return messages.NoiseIs(on=False, message="", ask=asked.ask)
         try:
-            self._stream = _playing(asked.level)
+            self._loop = NoiseLoop(asked.level)
+            self._stream = _playing(self._loop)
         except Exception as error:  # noqa: BLE001 - whatever the sound library says of its devices
             return messages.NoiseIs(on=False, message=_why_not(error), ask=asked.ask)
         return messages.NoiseIs(on=True, message="", ask=asked.ask)
@@ -39,10 +46,15 @@ class MaskingNoise:
 
     def ended(self) -> messages.NoiseEnded | None:
         """What is to be said where it was on and ended by itself: a sound device that is gone ends its stream."""
-        if self._stream is None or self._stream.active:
+        if self._stream is None or self._loop is None:
             return None
-        self.stop()
-        return messages.NoiseEnded(message=f"Masking noise has ended: its sound device is gone. {_REMEDY}")
+        if not self._stream.active:
+            self.stop()
+            return messages.NoiseEnded(message=f"Masking noise has ended: its sound device is gone. {_REMEDY}")
+        if self._silence.lasts(self._loop.blocks):
+            self._stream = None  # closing it would wait for the device
+            return messages.NoiseEnded(message=f"Masking noise has ended: its sound device stands still. {_REMEDY}")
+        return None
 
     def stop(self) -> None:
         """Silence."""
@@ -51,13 +63,12 @@ class MaskingNoise:
             self._stream = None
 
 
-def _playing(level: float) -> Any:
+def _playing(noise: NoiseLoop) -> Any:
     # imported when used: looking for sound devices takes seconds, and most studies use none
     from sounddevice import OutputStream, query_devices  # noqa: PLC0415
 
     if not any(device["max_output_channels"] for device in query_devices()):
         raise RuntimeError("the system lists none")
-    noise = NoiseLoop(level)
 
     def fill(out: Any, frames: int, *_: object) -> None:
         out[:] = noise.block(frames)
@@ -65,6 +76,22 @@ def _playing(level: float) -> Any:
     stream = OutputStream(channels=2, dtype="float32", callback=fill)
     stream.start()
     return stream
+
+
+class Silence:
+    """Whether a device that plays takes no blocks any more. `now_s` is a clock."""
+
+    def __init__(self, now_s: Callable[[], float] = machine_s) -> None:
+        self._now_s, self._blocks = now_s, -1
+        self._looked_s = self._silent_s = 0.0
+
+    def lasts(self, blocks: int) -> bool:
+        """Whether it has taken none for a while, in which this program itself did not stand still."""
+        now_s = self._now_s()
+        passed_s = min(now_s - self._looked_s, _LOOK_S)
+        self._silent_s = self._silent_s + passed_s if blocks == self._blocks else 0.0
+        self._blocks, self._looked_s = blocks, now_s
+        return self._silent_s > SILENT_S
 
 
 class NoiseLoop:
@@ -75,9 +102,12 @@ class NoiseLoop:
 
         drawn = np.random.default_rng(_SEED).uniform(-level, level, NOISE_ROUND)
         self._round, self._at = drawn.astype(np.float32)[:, None], 0
+        self.blocks = 0
+        """How many were taken."""
 
     def block(self, frames: int) -> Any:
         """The next samples (frames, 1), the same for both ears."""
+        self.blocks += 1
         places = range(self._at, self._at + frames)
         self._at = places.stop % len(self._round)
         return self._round.take(places, axis=0, mode="wrap")
