@@ -14,7 +14,7 @@ from experiments.screens.participant import messages
 
 NOISE_ROUND = 441_000
 """Samples until it begins again: some ten seconds, by the rate that the device has."""
-SILENT_S, _LOOK_S = 3.0, 1.5
+_SILENT_S, _LOOK_S = 3.0, 1.5
 """So long a device may take nothing; and what a look counts for at most: the program may have stood still before it."""
 _SEED = 20_240  # assumed; any will do, and the same noise for everybody
 
@@ -91,7 +91,7 @@ class Silence:
         passed_s = min(now_s - self._looked_s, _LOOK_S)
         self._silent_s = self._silent_s + passed_s if blocks == self._blocks else 0.0
         self._blocks, self._looked_s = blocks, now_s
-        return self._silent_s > SILENT_S
+        return self._silent_s > _SILENT_S
 
 
 class NoiseLoop:
