@@ -37,7 +37,7 @@ from experiments.screens.console.live import study_of
 from experiments.screens.console.start import NOTHING_ARMED, StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
-from experiments.study.folders import StudyFolder, open_study, place
+from experiments.study.folders import PlaceError, StudyFolder, open_study, place
 from experiments.study.new_study import new_study
 from experiments.study.register import read_register
 from experiments.study.study import Facts, Participant, RunProgress
@@ -365,6 +365,44 @@ def test_nobody_begins_anew_either_where_the_results_folder_went_while_they_ran(
     assert not study.results.exists()
 
 
+@pytest.mark.parametrize("ends", ["stopped", "finished", "never began"])
+def test_the_folder_of_somebody_who_began_just_now_is_missed(
+    ends: str, opened: Open, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    join(study, "P02")
+    request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results)
+    choices, openings = [request, None], list[Opening]()
+
+    def choose(_: StudyFolder, opening: Opening, __: object) -> RunRequest | None:
+        openings.append(opening)
+        return choices.pop(0)
+
+    def runs(*_: object, **__: object) -> None:
+        if ends != "finished":
+            raise RunStopped("moved") if ends == "stopped" else PlaceError("no gun")
+
+    monkeypatch.setattr(live, "choose_run", choose)
+    monkeypatch.setattr(live, "run_live", runs)
+    live.lab_day(request, (), lambda *_: nullcontext())
+    window = opened(had=openings[1].had)  # where their folder is not
+    fill(window, "P01")
+    key(window, "Return", CTRL)
+    assert (window.choice is None) is (ends != "never began")
+
+
+def test_nobody_begins_where_the_register_is_gone_which_says_who_is_excluded(opened: Open, study: StudyFolder) -> None:
+    do(study, "P01", records=20)
+    join(study, "P01")
+    window = opened()
+    (study.results / "participants.jsonl").rename(study.results.parent / "away")
+    fill(window, "P03")
+    key(window, "Return", CTRL)
+    assert window.choice is None
+    assert "participants.jsonl: was there, and is gone" in said(window)
+    key(window, "R", CTRL)  # the training is nobody's
+    assert window.choice is not None
+
+
 def test_somebody_whose_logs_are_gone_does_not_begin_anew(opened: Open, study: StudyFolder) -> None:
     for code in ("P01", "P02"):
         join(study, code)
@@ -404,7 +442,7 @@ def test_whatever_is_held_a_test_shot_is_stopped_and_called_off(
     window = opened(gun="simulated")
     key(window, "T", CTRL)
     until(lambda: window.shots.count.text() != "")
-    key(window, name, *(held if name == "F12" else held[:1]))
+    key(window, name, *held)
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == {"F12": "EMERGENCY STOP", "Escape": "Not fired"}[name]
     assert window.shots.owed is (name == "F12")

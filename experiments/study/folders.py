@@ -90,17 +90,21 @@ def files_of_people(results: Path) -> set[Path]:
 
 
 def refuse_gone(results: Path, had: Collection[Path], participant_id: str) -> None:
-    """`PlaceError` if all `files_of_people` that a folder had are gone, or somebody's own: they would begin anew."""
-    gone, own = [path for path in had if not path.exists()], results / f"sub-{participant_id}"
+    """`PlaceError` if all `files_of_people` that a folder had are gone, or somebody's own: they would begin anew.
+
+    Also if the register is, which says who is excluded. Without a code it is asked whether all are.
+    """
+    gone = [path for path in had if not path.exists()]
+    own = [results / f"sub-{participant_id}", results / register.REGISTER_FILE] if participant_id else []
     if gone and len(gone) == len(had):
         raise PlaceError(
             f"{results.resolve()}: all that was in it is gone: it was moved, or its disk is away. Put it back; or "
             "quit, and start Recoil again, to begin with nobody"
         )
-    if own in gone:
+    for lost in (path for path in own if path in gone):
         raise PlaceError(
-            f"{own.resolve()}: was there, and is gone: {participant_id} would begin anew. Put it back; or quit, and "
-            "start Recoil again, if they are to"
+            f"{lost.resolve()}: was there, and is gone: {participant_id} would begin as somebody new. Put it back; or "
+            "quit, and start Recoil again, if they are to"
         )
 
 

@@ -25,6 +25,7 @@ from experiments.earlier_run import NotAsItBegan, UnfinishedRun, gone_on_with
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
+from experiments.record.names import Place
 from experiments.run import Finished
 from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
@@ -35,7 +36,7 @@ from experiments.screens.console.start import SIMULATED, choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
-from experiments.screens.console.windows import FreshShortcuts, StopKey, let_go, signals_to
+from experiments.screens.console.windows import AnyHeld, FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
@@ -95,7 +96,7 @@ def lab_day(request: RunRequest, languages: tuple[Language, ...], markers: OpenM
     )
     with signals_to() as signalled:
         while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
-            said = _of_the_day(request, study, replace(choice, catalogues=request.catalogues), markers)
+            said = _of_the_day(request, study, replace(choice, catalogues=request.catalogues), markers, opening.had)
             code = "" if choice.training else choice.participant_id
             opening = replace(opening, named="", options=choice.options, language=choice.language.code)
             opening = replace(opening, sensor=choice.sensor, markers=choice.markers, participant_id=code, said=said)
@@ -125,8 +126,13 @@ def _what_is_next(study: StudyFolder, experiment: str) -> str:
     return phrase("Next: {later}.", later=later[0]) if later else THANK_PARTICIPANT
 
 
-def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest, markers: OpenMarkers) -> str:
-    """Carry out what was chosen; what went wrong, for the start window, which it must not end."""
+def _of_the_day(
+    request: RunRequest, study: StudyFolder, choice: RunRequest, markers: OpenMarkers, had: set[Path]
+) -> str:
+    """Carry out what was chosen; what went wrong, for the start window, which it must not end.
+
+    `had` gains the folder of whoever began.
+    """
     said: list[str] = []
     with ExitStack() as stack:
         if choice.training:
@@ -135,17 +141,21 @@ def _of_the_day(request: RunRequest, study: StudyFolder, choice: RunRequest, mar
         if choice.markers:
             beside = markers(choice.results, said.append)
             while_shown(phrase("Starting the markers …"), lambda: stack.enter_context(beside))
-        went_wrong = WITHOUT_MARKERS if said else _carried_out(replace(choice, seed=request.seed), study)
+        went_wrong = WITHOUT_MARKERS if said else _carried_out(replace(choice, seed=request.seed), study, had)
     return "\n".join(filter(None, (*said, went_wrong)))
 
 
 WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_markers}”.", sends_markers=SENDS_MARKERS)
 
 
-def _carried_out(choice: RunRequest, study: StudyFolder) -> str:
+def _carried_out(choice: RunRequest, study: StudyFolder, had: set[Path]) -> str:
+    where = Place(results=choice.results, participant_id=choice.participant_id, experiment="")
+    own = set[Path]() if choice.training else {where.folder}
     try:
         run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment))
+        had |= own
     except RunStopped as stop:
+        had |= own
         return _stopped(choice, str(stop), halted=stop.halted)
     except NotAsItBegan as other:
         return phrase("{refusal}, or press Start and choose “{set_aside}”.", refusal=other.refusal, set_aside=SET_ASIDE)
@@ -317,7 +327,7 @@ def while_shown(text: str, make: Callable[[], Made], emergency: Callable[[], Non
         shown.setText(phrase("EMERGENCY STOP"))
         emergency()
 
-    StopKey(shown, stop)
+    AnyHeld(shown, Qt.Key.Key_F12, stop)
     made: Future[Made] = Future()
 
     def work() -> None:

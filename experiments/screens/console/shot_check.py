@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Literal
 
 from PyQt6.QtCore import Qt, pyqtSignal
-from PyQt6.QtGui import QKeySequence, QShortcut
 from PyQt6.QtWidgets import QVBoxLayout, QWidget
 
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
@@ -237,8 +236,6 @@ class ShotPage(QWidget):
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
-        for held in ("Ctrl", "Shift", "Alt"):  # as the hand may have them still that began it
-            QShortcut(QKeySequence(f"{held}+Esc"), self).activated.connect(self.call_off)
         self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
         self.stop_button = widgets.button(self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop")
         down = widgets.fill(QVBoxLayout(self), self.title, self.detail, self.count)

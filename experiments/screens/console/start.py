@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from PyQt6 import QtWidgets
-from PyQt6.QtCore import QEvent, QEventLoop, pyqtSignal
+from PyQt6.QtCore import QEvent, QEventLoop, Qt, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent
 
 from device.messages import RecoilError
@@ -115,7 +115,8 @@ class StartWindow(QtWidgets.QWidget):
         self.form.experiment_edited.connect(self._show_choice)
         self.shots.left.connect(self._leave_shots)
         self.shots.over = self._shot_over
-        windows.StopKey(self, self._emergency_stop)
+        windows.AnyHeld(self, Qt.Key.Key_F12, self._emergency_stop)
+        windows.AnyHeld(self, Qt.Key.Key_Escape, self.shots.call_off, when=lambda: self.shots.is_running)
 
     # showing
 
@@ -132,7 +133,7 @@ class StartWindow(QtWidgets.QWidget):
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
 
-    def _read_anew(self) -> None:
+    def _read_anew(self, participant_id: str = "") -> None:
         """Have the study as its files are now. `ConfigError`; `PlaceError`: other fields, or as `refuse_gone`."""
         before, now = self._study, read_anew(self._study)
         fields = [(one.experiments, one.config.experiments, one.config.eligibility.ask) for one in (before, now)]
@@ -145,7 +146,7 @@ class StartWindow(QtWidgets.QWidget):
                 )
             )
         self._study = now
-        refuse_gone(now.results, self._opening.had, self.form.participant_id)
+        refuse_gone(now.results, self._opening.had, participant_id)
 
     def _say_first(self, opening: Opening) -> None:
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
@@ -275,18 +276,20 @@ class StartWindow(QtWidgets.QWidget):
     def _allowed(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
         entered = self.form.entered()
-        return self._checked(lambda: enrolment.may_run(self._study, entered, practice=practice)[0])
+        code = entered.participant_id
+        return self._checked(lambda: enrolment.may_run(self._study, entered, practice=practice)[0], code)
 
     def _admit(self, *, practice: bool) -> RunProgress | None:
         """As `_allowed`, with what was said on record."""
         entered = self.form.entered()
-        return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice))
+        code = entered.participant_id
+        return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice), code)
 
-    def _checked(self, check: Callable[[], _Found]) -> _Found | None:
+    def _checked(self, check: Callable[[], _Found], participant_id: str = "") -> _Found | None:
         """What a check found by the files as they are now; `None`, with the reason shown, if it refused."""
         self._take_back()
         try:
-            self._read_anew()
+            self._read_anew(participant_id)
             return check()
         except (ConfigError, PlaceError, JournalError) as error:
             self._refused(str(error))

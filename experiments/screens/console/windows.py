@@ -324,18 +324,20 @@ class FreshShortcuts(QtCore.QObject):
         return key == self._stale
 
 
-class StopKey(QtCore.QObject):
-    """Has F12 act in a window whatever else is held: a shortcut is not pressed for Qt where Ctrl is down beside it."""
+class AnyHeld(QtCore.QObject):
+    """Has a key act in a window whatever else is held: Qt takes a shortcut for another one where Ctrl is down beside it."""
 
-    def __init__(self, window: QWidget, act: Callable[[], object]) -> None:
+    def __init__(
+        self, window: QWidget, key: QtCore.Qt.Key, act: Callable[[], object], when: Callable[[], bool] = lambda: True
+    ) -> None:
         super().__init__(window)
-        self._act = act
+        self._key, self._act, self._when = key, act, when
         window.installEventFilter(self)
 
     def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
-        """Take F12 before it is looked for among the shortcuts, and as it is pressed."""
+        """Take the key before it is looked for among the shortcuts, and as it is pressed."""
         del watched
-        if not isinstance(event, QKeyEvent) or event.key() != QtCore.Qt.Key.Key_F12:
+        if not isinstance(event, QKeyEvent) or event.key() != self._key or not self._when():
             return False
         if event.type() == QtCore.QEvent.Type.KeyPress and not event.isAutoRepeat():
             self._act()
