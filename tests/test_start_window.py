@@ -1163,6 +1163,27 @@ def test_a_test_shot_pays_what_its_own_gun_owes(study: StudyFolder) -> None:
     assert [(one.gun, one.address) for one in owed_shots(study.results)] == guns[3:]
 
 
+def test_what_a_gun_owes_that_was_at_the_address_it_owes_elsewhere(study: StudyFolder) -> None:
+    owe_shot(study.results, OwedShot(utc="2026-01-01T00:00:00.000+00:00", gun="shaker:8", address=SERIAL))
+    shot_was_fired(study.results, "shaker:7", SERIAL)
+    (owed,) = owed_shots(study.results)
+    assert owed.gun == "shaker:8"
+    assert owed.address not in ("", SERIAL)
+
+
+def test_a_test_shot_is_called_off_where_another_window_has_the_keys(opened: Open) -> None:
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    other = QWidget()
+    other.show()
+    other.activateWindow()
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Not fired"
+    assert not window.shots.owed
+    other.deleteLater()
+
+
 @pytest.mark.parametrize("away", [True, False])
 def test_it_is_said_where_the_disk_does_not_keep_that_a_test_shot_is_owed(
     away: bool, opened: Open, study: StudyFolder, tmp_path: Path

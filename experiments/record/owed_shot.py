@@ -6,7 +6,7 @@ It is there until a test shot was fired beside all runs. One that was fired in a
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from experiments.record import storage
@@ -23,6 +23,7 @@ class OwedShot:
     address: str
 
 
+_ELSEWHERE = "another address"
 _UNREAD = OwedShot(utc="9999", gun="", address="")
 """A line that says nothing: whose it is nobody knows, so every gun owes it."""
 
@@ -51,9 +52,16 @@ def _of_line(line: bytes) -> OwedShot:
 
 
 def shot_was_fired(results: Path, gun: str, address: str) -> None:
-    """A test shot was fired on a gun: it owes none any more. `OSError`, if the disk does not take that."""
+    """A test shot was fired on a gun: it owes none any more. `OSError`, if the disk does not take that.
+
+    What another gun owes that was at its address, it owes wherever it is now.
+    """
     owed = owed_shots(results)
-    others = [one for one in owed if one.gun != gun and one.address not in ("", address)]
+    others = [
+        replace(one, address=_ELSEWHERE) if one.address == address else one
+        for one in owed
+        if one.gun not in ("", gun) or (not one.gun and one.address not in ("", address))
+    ]
     if others:
         _write(results, others)
     elif owed:

@@ -292,9 +292,9 @@ class ShotPage(QWidget):
         if self._check is not None:
             self._check.emergency_stop()
             self._gun_name = self._check.gun_name
-        self.stopped = self.owed = True
-        self._unkept = ""
-        if not is_simulated(self._gun):
+        is_new, self.stopped, self.owed = not self.stopped, True, True
+        if is_new and not is_simulated(self._gun):
+            self._unkept = ""
             threading.Thread(target=self._owe, name="owed").start()  # a disk may take its time
         over = phrase(
             "{outcome} That was over when you stopped it: a test shot comes first, whatever is done next.",

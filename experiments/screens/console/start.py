@@ -192,6 +192,8 @@ class StartWindow(QtWidgets.QWidget):
         super().changeEvent(event)
         if event is None or event.type() != QEvent.Type.ActivationChange:
             return
+        if not self.isActiveWindow():
+            self.shots.call_off()  # F12 would not be heard
         if self.isActiveWindow() and self._was_left and not self.shots.is_running:
             self._fill()
             self._show_choice()
@@ -276,20 +278,18 @@ class StartWindow(QtWidgets.QWidget):
     def _allowed(self, *, practice: bool) -> RunProgress | None:
         """How the run stands that may begin now; `None`, with the reason shown, if it may not."""
         entered = self.form.entered()
-        code = entered.participant_id
-        return self._checked(lambda: enrolment.may_run(self._study, entered, practice=practice)[0], code)
+        return self._checked(lambda: enrolment.may_run(self._study, entered, practice=practice)[0], theirs=True)
 
     def _admit(self, *, practice: bool) -> RunProgress | None:
         """As `_allowed`, with what was said on record."""
         entered = self.form.entered()
-        code = entered.participant_id
-        return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice), code)
+        return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice), theirs=True)
 
-    def _checked(self, check: Callable[[], _Found], participant_id: str = "") -> _Found | None:
-        """What a check found by the files as they are now; `None`, with the reason shown, if it refused."""
+    def _checked(self, check: Callable[[], _Found], *, theirs: bool = False) -> _Found | None:
+        """What a check found by the files as they are now, or `theirs`; `None`, with the reason shown, if it refused."""
         self._take_back()
         try:
-            self._read_anew(participant_id)
+            self._read_anew(self.form.participant_id if theirs else "")
             return check()
         except (ConfigError, PlaceError, JournalError) as error:
             self._refused(str(error))

@@ -325,7 +325,7 @@ class FreshShortcuts(QtCore.QObject):
 
 
 class AnyHeld(QtCore.QObject):
-    """Has a key act in a window whatever else is held: Qt takes a shortcut for another one where Ctrl is down beside it."""
+    """Has a key act in a window whatever else is held: with Ctrl beside it Qt takes it for another shortcut."""
 
     def __init__(
         self, window: QWidget, key: QtCore.Qt.Key, act: Callable[[], object], when: Callable[[], bool] = lambda: True
