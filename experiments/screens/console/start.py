@@ -286,7 +286,7 @@ class StartWindow(QtWidgets.QWidget):
         return self._checked(lambda: enrolment.admit(self._study, entered, self._clock, practice=practice), theirs=True)
 
     def _checked(self, check: Callable[[], _Found], *, theirs: bool = False) -> _Found | None:
-        """What a check found by the files as they are now, or `theirs`; `None`, with the reason shown, if it refused."""
+        """What a check found by the files as they are now, or `theirs`; `None`, with the reason said, if it refused."""
         self._take_back()
         try:
             self._read_anew(self.form.participant_id if theirs else "")
