@@ -393,11 +393,8 @@ def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
         return True
     if is_simulated(gun):
         return False
-    words = [
-        *_words_on(gun, where.results, where.journal),
-        *([] if before is None else [last_word_on_gun(before, gun)]),
-    ]
-    return max(words, default=("", False))[1]
+    mine = [] if before is None else [last_word_on_gun(before, gun)]
+    return max([*mine, *_words_on(gun, where.results, where.journal)], default=("", False))[1]
 
 
 def owes_shot(results: Path, address: str) -> bool:

@@ -1602,30 +1602,24 @@ def test_an_emergency_stop_that_cannot_be_written_is_said_and_is_on_record_once_
         sitting.to(S.REARMING)
 
 
-def test_an_emergency_stop_is_on_record_by_its_reason_if_that_can_be_written_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("word", "again"),
+    [(events.Reason(text="the cable was loose"), []), (events.Note(text="room was made"), ["experimenter"])],
+)
+def test_an_emergency_stop_that_the_disk_refused_is_on_record_once_anything_is_written_again(
+    word: events.Event, again: list[str], tmp_path: Path
+) -> None:
+    """By its reason, or by itself again: once."""
     with sat_at(S.ASKING, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
         full_for_one_record(disk)
         assert sitting.live.offer(events.EmergencyStop())
         wait_for(lambda: sitting.live.halt_unsaved, "it is not said")
-        assert sitting.live.offer(events.Reason(text="the cable was loose"))
-        wait_for(lambda: not sitting.live.halt_unsaved, "it is still said")
-        journal = sitting.live.journal.path.read_bytes()
-    sitting.live.journal.path.write_bytes(journal)  # as if it was killed: nothing says why the run ended
-    with sat(DIRECTION, tmp_path, resumed=True) as sitting:
-        sitting.to(S.REARMING)
-
-
-def test_an_emergency_stop_that_the_disk_refused_is_on_record_once_anything_is_written_again(tmp_path: Path) -> None:
-    with sat_at(S.ASKING, tmp_path) as sitting, pytest.MonkeyPatch.context() as disk:
-        full_for_one_record(disk)
-        assert sitting.live.offer(events.EmergencyStop())
-        wait_for(lambda: sitting.live.halt_unsaved, "it is not said")
-        assert sitting.live.offer(events.Note(text="room was made"))
+        assert sitting.live.offer(word)
         wait_for(lambda: not sitting.live.halt_unsaved, "it is still said")
         journal = sitting.live.journal.path.read_bytes()
         assert sitting.live.offer(events.Note(text="and more"))
         sitting.live.journal.catch_up()
-        assert [one.by for one in remarks(of_journal(sitting), Halted)] == ["experimenter"]  # once
+        assert [one.by for one in remarks(of_journal(sitting), Halted)] == again
     sitting.live.journal.path.write_bytes(journal)  # as if it was killed: nothing says why the run ended
     with sat(DIRECTION, tmp_path, resumed=True) as sitting:
         sitting.to(S.REARMING)

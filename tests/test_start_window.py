@@ -1078,6 +1078,16 @@ def test_the_emergency_stop_of_a_test_shot_says_what_the_gun_reports(opened: Ope
     assert "Is the gun where it hurts nobody?" in question(window)
 
 
+def is_asked_for_a_test_shot(window: StartWindow, begins: str) -> None:
+    """Nothing begins before it, and it is fired."""
+    key(window, begins, CTRL)
+    assert window.choice is None
+    assert "A test shot comes first. Is the gun where it hurts nobody?" in question(window)
+    key(window, "S", CTRL)
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Fired"
+
+
 @pytest.mark.parametrize("begins", ["Return", "P", "R"])
 def test_after_an_emergency_stop_of_a_test_shot_nothing_begins_before_one_was_fired(
     begins: str, opened: Open, monkeypatch: pytest.MonkeyPatch
@@ -1090,12 +1100,7 @@ def test_after_an_emergency_stop_of_a_test_shot_nothing_begins_before_one_was_fi
     key(window, "F12")
     until(lambda: not window.shots.is_running)
     key(window, "Escape")
-    key(window, begins, CTRL)
-    assert window.choice is None
-    assert "A test shot comes first. Is the gun where it hurts nobody?" in question(window)
-    key(window, "S", CTRL)
-    until(lambda: not window.shots.is_running)
-    assert window.shots.title.text() == "Fired"
+    is_asked_for_a_test_shot(window, begins)
     key(window, "Escape")
     key(window, begins, CTRL)
     key(window, "S", CTRL)  # simulated, all the same
@@ -1119,12 +1124,7 @@ def test_a_test_shot_that_an_emergency_stop_left_owed_is_owed_in_later_windows_t
         window = opened(gun=gun)
         assert said(window) == "The last test shot ended by an emergency stop."
         fill(window, "P01")
-        key(window, "Return", CTRL)
-        assert window.choice is None
-        assert "A test shot comes first" in question(window)
-        key(window, "S", CTRL)
-        until(lambda: not window.shots.is_running)
-        assert window.shots.title.text() == "Fired"
+        is_asked_for_a_test_shot(window, "Return")
     assert not owed_shots(study.results)
     assert not opened(gun=gun).shots.owed
 
@@ -1228,11 +1228,7 @@ def test_an_emergency_stop_behind_a_test_shot_counts(
         (owed,) = owed_shots(study.results)
         assert owed.gun
         key(window, "Escape")
-        key(window, "R", CTRL)
-        assert window.choice is None
-        assert "A test shot comes first" in question(window)
-        key(window, "S", CTRL)
-        until(lambda: not window.shots.is_running)
+        is_asked_for_a_test_shot(window, "R")
     assert not owed_shots(study.results)
 
 

@@ -34,7 +34,7 @@ class Place:
     @property
     def folder(self) -> Path:
         """The participant's folder."""
-        return self.results / f"sub-{self.participant_id}"
+        return participant_folder(self.results, self.participant_id)
 
     @property
     def stem(self) -> str:
@@ -56,6 +56,11 @@ class Place:
     def shots(self) -> Path:
         """What a sensor measured of each shot; only where there was one."""
         return shots_path(self.journal)
+
+
+def participant_folder(results: Path, participant_id: str) -> Path:
+    """The folder of a participant."""
+    return results / f"sub-{participant_id}"
 
 
 def journals(results: Path, experiment: str = "", *, aside: bool = False) -> list[Path]:

@@ -22,7 +22,7 @@ from experiments.design.planned import order_shown
 from experiments.load import load_setup, load_study, shipped_folder
 from experiments.record import journal, replay, storage, tables
 from experiments.record.journal import Contents, Head, JournalError
-from experiments.record.names import Place, is_code
+from experiments.record.names import Place, is_code, participant_folder
 from experiments.record.rebuild import began_with
 from experiments.session.history import answered
 from experiments.session.practice_rounds import is_to_be_repeated
@@ -95,7 +95,7 @@ def refuse_gone(results: Path, had: Collection[Path], participant_id: str) -> No
     Also if the register is, which says who is excluded. Without a code it is asked whether all are.
     """
     gone = [path for path in had if not path.exists()]
-    own = [results / f"sub-{participant_id}", results / register.REGISTER_FILE] if participant_id else []
+    own = [participant_folder(results, participant_id), results / register.REGISTER_FILE] if participant_id else []
     if gone and len(gone) == len(had):
         raise PlaceError(
             f"{results.resolve()}: all that was in it is gone: it was moved, or its disk is away. Put it back; or "
@@ -368,7 +368,7 @@ def data_of(head: Head) -> tables.DataKind:
 
 def refuse_open_run(results: Path, participant_id: str) -> None:
     """`PlaceError` while somebody sits at a run or a practice; `JournalError`, if nobody can say."""
-    for path in sorted((results / f"sub-{participant_id}").glob("*_journal.jsonl")):
+    for path in sorted(participant_folder(results, participant_id).glob("*_journal.jsonl")):
         if _is_held(path):
             raise PlaceError(
                 f"participant {participant_id} sits at another console, where {path.name} is open: close it there first"

@@ -25,7 +25,7 @@ from experiments.earlier_run import NotAsItBegan, UnfinishedRun, gone_on_with
 from experiments.live_run import RunStopped
 from experiments.load import load_setup, load_study
 from experiments.record.journal import JournalError
-from experiments.record.names import Place
+from experiments.record.names import participant_folder
 from experiments.run import Finished
 from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
@@ -149,8 +149,7 @@ WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_
 
 
 def _carried_out(choice: RunRequest, study: StudyFolder, had: set[Path]) -> str:
-    where = Place(results=choice.results, participant_id=choice.participant_id, experiment="")
-    own = set[Path]() if choice.training else {where.folder}
+    own = set[Path]() if choice.training else {participant_folder(choice.results, choice.participant_id)}
     try:
         run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment))
         had |= own

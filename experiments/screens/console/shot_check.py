@@ -112,7 +112,8 @@ class ShotCheck:
         methods = self._setup.gun.renderings(self._setup.config.methods)
         drive = drive_of(methods[self._method])
         with closing(open_gun(self._address, methods, clock=self._clock.now)) as gun:
-            self._gun, self.gun_name = gun, gun.identify().name
+            self._gun = gun
+            self.gun_name = gun.identify().name
             try:
                 outcome, mood = self._fire(gun, drive), "good"
             except (DeviceError, ValueError) as error:
