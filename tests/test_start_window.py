@@ -1180,8 +1180,22 @@ def test_a_test_shot_is_called_off_where_another_window_has_the_keys(opened: Ope
     other.activateWindow()
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == "Not fired"
+    assert window.shots.detail.toPlainText().startswith("Another window had the keys")
     assert not window.shots.owed
     other.deleteLater()
+
+
+@pytest.mark.parametrize("name", ["Space", "Return", "Enter"])
+def test_a_key_pressed_behind_a_test_shot_neither_stops_nor_fires(
+    name: str, opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 0)
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: not window.shots.is_running)
+    key(window, name)
+    assert not window.shots.owed
+    assert not window.shots.is_running
 
 
 @pytest.mark.parametrize("away", [True, False])

@@ -224,7 +224,7 @@ class ShotPage(QWidget):
         self._gun_name, self._had_results = "", results.is_dir()
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
-        self._unkept = ""
+        self._unkept = self._why = ""
         self.told.connect(self._take)
         self.unkept.connect(self._say_unkept)
         self._build()
@@ -327,9 +327,10 @@ class ShotPage(QWidget):
             with suppress(OSError):  # one test shot more is asked for then
                 shot_was_fired(self._results, self._gun_name, self._gun)
 
-    def call_off(self) -> None:
+    def call_off(self, why: str = "") -> None:
         """Fire no more, if it has not fired."""
         if self._check is not None:
+            self._why = why
             self._check.call_off()
 
     def _escape(self) -> None:
@@ -357,13 +358,13 @@ class ShotPage(QWidget):
     def _end(self, told: ShotProgress) -> None:
         if self._check is not None:
             self._gun_name = self._check.gun_name
-        self._check = None
+        self._check, why, self._why = None, self._why, ""
         if told.fired:
             self._method_at += 1
             self.owed = self.stopped
             self._settle()
         title = phrase("EMERGENCY STOP") if self.stopped else phrase("Fired") if told.fired else phrase("Not fired")
-        self._show(title, told.text, told.mood)
+        self._show(title, told.text if told.fired else " ".join(filter(None, [why, told.text])), told.mood)
         self._running(False)
         self.over()
 
@@ -374,6 +375,8 @@ class ShotPage(QWidget):
         self.count.setText("")
 
     def _running(self, running: bool) -> None:
+        if not running:
+            self.call_off_button.setFocus()  # a key pressed behind the shot stops nothing and fires nothing
         self.next_button.setVisible(not (running or self.stopped))
         self.next_button.setText(phrase("{next}  [Ctrl+T]", next=self.next_text()))
         self.call_off_button.setText(phrase("Call it off  [Esc]") if running else phrase("Back  [Esc]"))

@@ -193,7 +193,7 @@ class StartWindow(QtWidgets.QWidget):
         if event is None or event.type() != QEvent.Type.ActivationChange:
             return
         if not self.isActiveWindow():
-            self.shots.call_off()  # F12 would not be heard
+            self.shots.call_off(phrase("Another window had the keys: F12 would not have been heard."))
         if self.isActiveWindow() and self._was_left and not self.shots.is_running:
             self._fill()
             self._show_choice()
