@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.predict.design_search.choice import both_ways, evidences, logits, predict, rates
-from analysis.predict.design_search.space import COIL_POINTS, FREE_POINTS, FrictionRow, shot_percepts, shots, summarised
+from analysis.predict.design_search.felt import COIL_POINTS, FREE_POINTS, Feeling, feel_on, percepts_of_shots
+from analysis.predict.design_search.run import compiler_note
+from analysis.predict.design_search.space import FrictionRow, shots, simulate_rows
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
+from analysis.predict.jobs import one_by_one
 from device.limits import (
     BEYOND_DUTY,
     BEYOND_HEAT,
@@ -40,6 +45,7 @@ GUNS = [
     replace(GUN, friction_N=friction, voltage_V=voltage, pulse_s=pulse)
     for friction, voltage, pulse in ((0.21, 16.0, 0.01), (1.12, 16.0, 0.01), (0.21, 24.0, 0.005), (1.0, 5.0, 0.02))
 ]
+VOLTAGES = (0.0, 0.7, 3.0, 8.0, 16.0, 24.0)
 nonnegative = st.floats(0.0, 12.0)
 
 
@@ -58,8 +64,8 @@ def rate_of(percept: Percept) -> float:
 @pytest.mark.parametrize("gun", GUNS)
 def test_four_times_the_points_change_the_rate_by_less_than_half_a_thousandth(gun: GunParameters) -> None:
     summary, fine = simulate(gun), (4 * COIL_POINTS, 4 * FREE_POINTS)
-    (coarse,), (exact,) = (
-        shot_percepts(gun, summary, (0.02,), points) for points in ((COIL_POINTS, FREE_POINTS), fine)
+    ((coarse,),), ((exact,),) = (
+        percepts_of_shots([gun], [summary], (0.02,), points) for points in ((COIL_POINTS, FREE_POINTS), fine)
     )
     assert rate_of(coarse) == pytest.approx(rate_of(exact), abs=5e-4)
 
@@ -67,7 +73,7 @@ def test_four_times_the_points_change_the_rate_by_less_than_half_a_thousandth(gu
 @pytest.mark.slow
 @pytest.mark.parametrize("gun", GUNS)
 def test_a_fine_trace_gives_the_same_percept(gun: GunParameters) -> None:
-    (felt,) = shot_percepts(gun, simulate(gun), (0.02,))
+    ((felt,),) = percepts_of_shots([gun], [simulate(gun)], (0.02,))
     traced = percept_of_trace(trace(gun, 20_000), gun.magnet_mass_kg, 0.02)
     assert rate_of(felt) == pytest.approx(rate_of(traced), abs=1e-3)
 
@@ -80,22 +86,48 @@ def test_a_shot_that_sticks_or_stays_has_no_percept() -> None:
 
 
 @pytest.mark.slow
-def test_the_compiled_summaries_give_the_same_shots() -> None:
-    """To rounding: the summary and the course then come from two runs of the model."""
+@pytest.mark.parametrize("changed", [{}, {"drive_off": "open"}, {"emf": "reciprocal"}, {"inductance_H": 1e-9}])
+def test_the_compiler_gives_the_same_shots(monkeypatch: pytest.MonkeyPatch, changed: dict[str, Any]) -> None:
+    """Also those that stick, stay, creep, or are not home in time; under more leaks than one."""
     pytest.importorskip("numba")
-    row = FrictionRow(gun=GUN, voltage_V=(0.0, 8.0, 16.0, 24.0), leaks_s=(0.02,))
-    for one, other in zip(shots(row), shots(summarised(row)), strict=True):
-        assert one.status == other.status
-        assert one.period_s == pytest.approx(other.period_s, rel=1e-9, nan_ok=True)
-        for a, b in zip(one.felt, other.felt, strict=True):
-            assert [a.first, a.reaction, a.second] == pytest.approx([b.first, b.reaction, b.second], rel=1e-9)
+    rows = [
+        FrictionRow(gun=replace(GUN, friction_N=f, pulse_s=p, **changed), voltage_V=VOLTAGES, leaks_s=(0.02, 0.01))
+        for f, p in ((0.0, 0.01), (0.21, 0.002), (1.12, 0.02), (1.54, 0.01))
+    ]
+    compiled = [shots(row) for row in rows]
+    monkeypatch.setattr(batch, "find_spec", lambda _name: None)
+    for row, found in zip(rows, compiled, strict=True):
+        for one, other in zip(shots(row), found, strict=True):
+            assert one.status == other.status
+            assert one.period_s == pytest.approx(other.period_s, rel=1e-9, nan_ok=True)
+            for a, b in zip(one.felt, other.felt, strict=True):
+                assert [a.first, a.reaction, a.second] == pytest.approx([b.first, b.reaction, b.second], rel=1e-9)
+
+
+def test_a_shot_is_felt_as_its_course_of_times_and_forces_is() -> None:
+    """Against the other way there: the times and forces of a trace, through `percept_of_course`."""
+    drawn = trace(GUN, 3000)
+    one = Feeling(0.02, drawn.summary.firing_end_s or 0.0, drawn.summary.reset_end_s or 0.0)
+    for time_s, force_N in zip(drawn.time_s.tolist(), drawn.force_N.tolist(), strict=True):
+        feel_on(one, time_s, force_N)
+    expected = percept_of_trace(drawn, GUN.magnet_mass_kg, 0.02)
+    blow_N = GUN.magnet_mass_kg * (drawn.summary.impact_speed_m_s or 0.0) / 0.02
+    found = (one.first_N, -one.least_N, max(one.late_N, one.landing_N + blow_N))
+    assert found == (expected.first, expected.reaction, expected.second)
 
 
 def test_without_the_compiler_the_workers_simulate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(batch, "find_spec", lambda _name: None)
-    row = FrictionRow(gun=GUN, voltage_V=(16.0,), leaks_s=(0.02,))
-    assert summarised(row) is row
-    assert shots(row)[0].status == HOME
+    row, asked = FrictionRow(gun=GUN, voltage_V=(16.0,), leaks_s=(0.02,)), list[object]()
+
+    def run(function: Callable[[object], object], pieces: Sequence[object], done: Callable[[int, Any], None]) -> None:
+        asked.extend(pieces)
+        one_by_one(function, pieces, done)
+
+    ((shot,),) = simulate_rows([row], run, lambda _words: None)
+    assert shot.status == HOME
+    assert asked == [row]
+    assert "recoil[fast]" in compiler_note()
 
 
 def test_a_shot_without_bullet_firing_says_nothing_by_its_summary() -> None:

@@ -95,7 +95,7 @@ def test_a_compiled_shot_changes_nothing_for_the_next_interpreted_one():
 
 def test_without_the_compiler_a_compiled_shot_is_refused(monkeypatch):
     monkeypatch.setattr(batch, "find_spec", lambda _name: None)
-    batch.machine_code.cache_clear()
+    batch.compiled.cache_clear()
     with pytest.raises(RecoilError, match=r"recoil\[fast\]"):
         compiled_simulator()
 

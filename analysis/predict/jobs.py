@@ -40,6 +40,12 @@ _SAME = ("recoil", "numpy", "scipy")
 """What workers must have in the versions of this machine, lest their numbers differ."""
 
 
+def one_by_one(function: Function, pieces: Sequence[Any], done: Done) -> None:
+    """In this process, one after the other."""
+    for number, piece in enumerate(pieces):
+        done(number, function(piece))
+
+
 @contextmanager
 def on_processes(workers: int) -> Iterator[RunPieces]:
     """On so many processes of their own, started anew ("spawn") so that it is the same on every system.
@@ -64,8 +70,7 @@ _MOST_ON_WINDOWS = 61
 def _on_processes(workers: int, function: Function, pieces: Sequence[Any], done: Done) -> None:
     workers = min(workers, len(pieces), _MOST_ON_WINDOWS if sys.platform == "win32" else workers)
     if workers < 2:
-        for number, piece in enumerate(pieces):
-            done(number, function(piece))
+        one_by_one(function, pieces, done)
         return
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
     try:

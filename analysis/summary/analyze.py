@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -33,7 +33,7 @@ from analysis.summary.results import STATISTICS_FILE, RulesApplied, StudyStatist
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
 from analysis.summary.summary import summarize
-from analysis.summary.tables_out import TABLE_FILES, result_tables
+from analysis.summary.tables_out import TABLE_FILES, result_tables, table_names
 from device.messages import first_few
 from experiments.config.door import ConfigError, load
 from experiments.config.setup import sha256
@@ -88,7 +88,7 @@ class _Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Analysed:
-    """Logs of one kind of data, their statistics, what rules did to them, and the tables of results by file name.
+    """Logs of one kind of data, their statistics, and what rules did to them.
 
     `frozen`: the tests of the preregistration that were made, as no others were asked for.
     """
@@ -96,7 +96,6 @@ class _Analysed:
     logs: Logs
     statistics: StudyStatistics
     effect: ExclusionEffect | None
-    tables: Mapping[str, bytes]
     frozen: tuple[JsonValue, ...] = ()
 
 
@@ -116,9 +115,7 @@ def analyze(
         logs = _usable(request, files, track)
         with progress("analyze", _PARTS) as tell:
             report, parts, edited = _analysis(request, files, logs, tell)
-            write_report(part, report, tell)
-        for path, content in _tables(parts).items():
-            placing.write_file(part, path, content)
+            write_report(part, report, tell, meanwhile=lambda: _write_tables(part, parts))
     notes = (*map(str, logs.notes), *_without_effect(parts))
     return report.statistics, (*edited, *_said(logs, report.statistics)), notes
 
@@ -173,7 +170,7 @@ def _analysis(
         problems=logs.problems,
         remarks=(*logs.remarks, *logs.notes),
         comparison=compared,
-        beside=tuple(main.tables),
+        beside=table_names(main.logs, main.statistics.analysed),
         provenance=provenance() | _read_by(request.columns, files.mapping),
         extra=(*request.extra, *told.extra),
         apart=tuple(_told(one, files.mapping, logs.remarks) for one in others),
@@ -190,9 +187,14 @@ def _without_effect(parts: Sequence[_Analysed]) -> tuple[str, ...]:
 
 def _tables(parts: Sequence[_Analysed]) -> dict[str, bytes]:
     """The tables of results by path: those of data that are kept apart in folders of their own."""
-    first, *others = parts
-    apart = {f"{folder_of(one.logs.kind)}/{name}": data for one in others for name, data in one.tables.items()}
-    return {**first.tables, **apart}
+    first, *others = ((one.logs.kind, result_tables(one.logs, one.statistics.analysed)) for one in parts)
+    apart = {f"{folder_of(kind)}/{name}": data for kind, tables in others for name, data in tables.items()}
+    return {**first[1], **apart}
+
+
+def _write_tables(out: Path, parts: Sequence[_Analysed]) -> None:
+    for path, content in _tables(parts).items():
+        placing.write_file(out, path, content)
 
 
 def _said(logs: Logs, statistics: StudyStatistics) -> Iterator[str]:
@@ -253,7 +255,6 @@ def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, 
         logs=used,
         statistics=with_everybody(statistics, used, () if apart else request.left_out),
         effect=effect,
-        tables=result_tables(used, statistics.analysed),
         frozen=frozen,
     )
 

@@ -35,6 +35,12 @@ TABLE_FILES = (*_TABLES, *(f"{folder_of(kind)}/{name}" for kind in get_args(Data
 """What the files of tables are called, those of data that are kept apart too."""
 
 
+def table_names(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> tuple[str, ...]:
+    """What the tables of results are called, in their order."""
+    within = (f"{name}_{shape}.csv" for name in logs.tables if name in analysed for shape in ("long", "wide"))
+    return (*within, *(f"{one.design.design}_long.csv" for one in logs.designs))
+
+
 def result_tables(logs: Logs, analysed: Mapping[str, WithinStatistics]) -> dict[str, bytes]:
     """File names and contents: `direction_long.csv`, `direction_wide.csv`, `preference_long.csv`, ..."""
     files: dict[str, bytes] = {}

@@ -37,7 +37,7 @@ from device.physics.equations import (
     model_number,
     pack,
 )
-from device.physics.shot import ShotSummary, interpret, summary_from
+from device.physics.shot import ShotSummary, interpret, simulate, summary_from
 
 Records = NDArray[Any]
 """Arrays whose fields are those of `Constants`, or of `ShotResult`."""
@@ -45,11 +45,12 @@ Records = NDArray[Any]
 _KINDS: dict[object, tuple[Any, ...]] = {float: ("f8",), int: ("i8",), bool: ("?",), list[float]: ("f8", (ORDER + 1,))}
 
 
-def _record_of(kind: type) -> np.dtype[Any]:
+def array_kind(kind: type) -> np.dtype[Any]:
+    """What machine code has in place of objects of a class of numbers, with the same names."""
     return np.dtype([(name, *_KINDS[hint]) for name, hint in get_type_hints(kind).items()], align=True)
 
 
-_GUN, _STATE, _SERIES, _RESULT = map(_record_of, (Constants, ShotState, StepSeries, ShotResult))
+_GUN, _STATE, _SERIES, _RESULT = map(array_kind, (Constants, ShotState, StepSeries, ShotResult))
 _LETTERS = {float: "d", int: "q", bool: "?"}
 _GUN_BYTES, _RESULT_BYTES = (
     struct.Struct("@" + "".join(_LETTERS[hint] for hint in get_type_hints(kind).values()))
@@ -121,16 +122,20 @@ def no_compiler() -> str:
     return ""
 
 
-@lru_cache(maxsize=1)
 def machine_code() -> MachineCode:
     """The shots of many guns in machine code. `RecoilError`: there is no compiler."""
+    from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler
+
+    return compiled(cast("FunctionType", shoot_each))
+
+
+@lru_cache(maxsize=4)
+def compiled(each: FunctionType) -> MachineCode:
+    """A function of arrays of records, with all that it calls, in machine code. `RecoilError`: there is no compiler."""
     if why := no_compiler():
         raise RecoilError(f"compiled shots need numba; {why}")
     import numba  # noqa: PLC0415 - the compiler waits until it is asked for
 
-    from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler
-
-    each = cast("FunctionType", shoot_each)
     functions = _callees_first(each)
     twins: dict[FunctionType, Any] = {}
     for function, called in functions.items():
@@ -148,7 +153,7 @@ def machine_code() -> MachineCode:
 
 def _digest(functions: Functions) -> str:
     """Of what the functions do, and of what they name: the compiler's own cache looks at one file only."""
-    parts = [_text(function.__code__) for function in (*functions, cast("FunctionType", machine_code.__wrapped__))]
+    parts = [_text(function.__code__) for function in (*functions, cast("FunctionType", compiled.__wrapped__))]
     for function in functions:
         values = (function.__globals__.get(name) for name in function.__code__.co_names)
         parts += [repr(value) for value in values if isinstance(value, int | float | tuple | np.dtype)]
@@ -236,6 +241,12 @@ def simulate_batch(
             if progress is not None:
                 progress(shots)
     return found
+
+
+@lru_cache(maxsize=1)
+def simulator() -> Callable[..., ShotSummary]:
+    """`simulate`, in machine code where there is a compiler; for one thread."""
+    return simulate if no_compiler() else compiled_simulator()
 
 
 def compiled_simulator() -> Callable[..., ShotSummary]:

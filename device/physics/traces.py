@@ -9,10 +9,10 @@ while the force fades, and makes or swallows energy. The impulse on the hand ove
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,8 @@ from device.physics.segments import (
 from device.physics.shot import ShotSummary, simulate
 
 _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoil stage
-_FARTHEST = 1e-11  # relative: how far speed may jump where a ring is left
+FARTHEST_IN_TRACE = 1e-11
+"""How far speed may jump where a ring is left, as a share: what is felt or drawn shows a jump."""
 _REST_AFTER_S = 0.010  # shown after the last motion
 
 
@@ -111,7 +112,7 @@ class Segment:
 
 def segments(constants: Constants) -> Iterator[Segment]:
     """The segments of one shot from rest, in order; the last one is settled for good, or given up."""
-    s, w = ShotState(farthest=_FARTHEST), StepSeries()
+    s, w = ShotState(farthest=FARTHEST_IN_TRACE), StepSeries()
     pulse_on(constants, s)
     enter(constants, s, BREAK_AWAY)
     for _ in range(MAX_SEGMENTS):
@@ -147,27 +148,6 @@ def _segment(constants: Constants, began: _Began, s: ShotState, w: StepSeries, e
         step_s=s.span if coil else 1.0,
         series=CoilSeries(w.x.copy(), w.v.copy(), w.i.copy()) if coil else None,
     )
-
-
-def coil_forces(steps: Sequence[Segment], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times and the force on the hand, (steps, points + 1), at both ends of each step in the coil and evenly in it.
-
-    The digits of `Segment.at` and `Segment.force`.
-    """
-    p = steps[0].constants
-    columns = [(one.start_s, one.end_s, one.step_s, friction(p, one.heading)) for one in steps]
-    start_s, end_s, step_s, held_N = (column[:, None] for column in np.array(columns).T)
-    times = start_s + (end_s - start_s) * np.arange(points + 1.0) / points
-    times[:, 0] = start_s[:, 0]
-    s = (times - start_s) / step_s
-    x, i = (value_at(_coefficients(steps, name), s) for name in ("x", "i"))
-    motor = p.motor_constant * np.maximum(0.0, (p.coil_reach - x) / p.coil_reach) * i
-    return times, motor - spring_force(p, x) + held_N
-
-
-def _coefficients(steps: Sequence[Segment], name: str) -> Any:
-    """One series of each step, (ORDER + 1, steps, 1): numbers for `value_at` as arrays."""
-    return np.array([getattr(one.series, name) for one in steps]).T[:, :, None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

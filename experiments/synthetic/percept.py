@@ -65,20 +65,25 @@ class Percept:
     second: float
 
 
-_SAME_S = 1e-9  # a shot's times and its course come from two runs of the model, compiled or not
+SAME_S = 1e-9  # a shot's times and its course come from two runs of the model, compiled or not
 
 SILENT = Percept(first=0.0, reaction=0.0, second=0.0)
 """What a vibration gives."""
+
+
+def leaky_mean(x: float, before_N: float, after_N: float, step_s: float, leak_s: float) -> float:
+    """The leaky mean that was `x`, after a step (not none) over which the force went evenly from one to the other."""
+    slope, fall = (after_N - before_N) / step_s, -math.expm1(-step_s / leak_s)
+    return x + (before_N - x) * fall + slope * (step_s - leak_s * fall)
 
 
 def felt_course(time_s: list[float], force_N: list[float], leak_s: float) -> list[float]:
     """The leaky mean x at each time, exact for a force that is linear in between; 0 at the first time."""
     x, course = 0.0, [0.0]
     for i in range(1, len(time_s)):
-        step = time_s[i] - time_s[i - 1]
-        if step > 0.0:
-            slope, fall = (force_N[i] - force_N[i - 1]) / step, -math.expm1(-step / leak_s)
-            x += (force_N[i - 1] - x) * fall + slope * (step - leak_s * fall)
+        step_s = time_s[i] - time_s[i - 1]
+        if step_s > 0.0:
+            x = leaky_mean(x, force_N[i - 1], force_N[i], step_s, leak_s)
         course.append(x)
     return course
 
@@ -95,10 +100,10 @@ def percept_of_course(
     course = felt_course(times, force_N, leak_s)
     parts = [shot.firing_end_s, shot.reset_end_s]
     border_s = min((part for part in parts if part is not None), default=math.inf)
-    cut = bisect_right(times, border_s + _SAME_S)
+    cut = bisect_right(times, border_s + SAME_S)
     early, late = course[:cut], course[cut:]
     if shot.reset_end_s is not None and shot.impact_speed_m_s is not None:
-        before = max(0, bisect_right(times, shot.reset_end_s + _SAME_S) - 1)
+        before = max(0, bisect_right(times, shot.reset_end_s + SAME_S) - 1)
         late.append(course[before] + magnet_mass_kg * shot.impact_speed_m_s / leak_s)
     reaction = -min([*early, *late])
     return Percept(first=max(0.0, *early), reaction=max(0.0, reaction), second=max([0.0, *late]))

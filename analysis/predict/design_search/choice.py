@@ -21,7 +21,6 @@ from analysis.stats.arrays import FloatArray
 from device.limits import TRAIN_LIMITS, broken_limit
 from device.methods import Method
 from device.parameters import GunParameters
-from device.physics import simulate
 from device.physics.equations import HOME
 from device.physics.shot import rates_of_periods_Hz
 from experiments.design.streams import generator
@@ -287,7 +286,7 @@ def _lasts(row: FloatArray) -> bool:
 
 def rate_at(gun: GunParameters, parameters: PerceptParameters) -> float:
     """The predicted rate of one gun, simulated alone; NaN if its magnet does not come home."""
-    shot = shot_of(gun, simulate(gun), (parameters.leak_s,))
+    shot = shot_of(gun, (parameters.leak_s,))
     numbers = [(one.first, one.reaction, one.second) for one in shot.felt]
     return float(rates(np.array(numbers), parameters)[0]) if numbers else math.nan
 
@@ -437,7 +436,7 @@ def unbiased(layer: Layer, voltage_V: tuple[float, ...], fit: PerceptFit) -> Flo
 def under(gun: GunParameters, others: Sequence[Alternative]) -> dict[str, float]:
     """The predicted share for one gun under each other assumption, by name; NaN if its magnet does not come home."""
     leaks_s = tuple(dict.fromkeys(other.parameters.leak_s for other in others))
-    felt = dict(zip(leaks_s, shot_of(gun, simulate(gun), leaks_s).felt, strict=False))
+    felt = dict(zip(leaks_s, shot_of(gun, leaks_s).felt, strict=False))
     return {other.name: _rate(felt.get(other.parameters.leak_s), other.parameters) for other in others}
 
 

@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.predict.jobs import RunPieces
+from analysis.predict.design_search.felt import percepts_of_shots
+from analysis.predict.jobs import RunPieces, one_by_one
 from analysis.stats.arrays import FloatArray
 from device.limits import MAX_SHOTS_PER_MINUTE
 from device.parameters import GunParameters
-from device.physics import ShotSummary, simulate, simulate_batch
-from device.physics.batch import no_compiler
-from device.physics.equations import COIL, FREE, HOME, STATUSES, pack
-from device.physics.traces import Segment, coil_forces, segments
+from device.physics import ShotSummary, simulate_batch
+from device.physics.batch import no_compiler, simulator
+from device.physics.equations import HOME, STATUSES
 from device.words import MAX_PULSE_S, MAX_VOLTAGE_V
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.load import find, load_gun, load_setup
-from experiments.synthetic.percept import Percept, percept_of_course, percept_of_summary
+from experiments.synthetic.percept import Percept, percept_of_summary
 
 LEAST_GRID, MOST_GRID = 4, 200
 LEAST_PULSE_S = 0.002
@@ -172,21 +172,13 @@ def _frictions(own: dict[str, GunParameters]) -> tuple[float, float]:
     return low, max(BEYOND_PRELOAD * gun.stiffness_N_m * gun.preload_length_m, low + 1.0)
 
 
-COIL_POINTS, FREE_POINTS = 8, 32
-"""Points of the force in each stretch of a shot, within and outside the coil.
-
-With four times as many the predicted rates change by less than 0.0005 (`tests/test_design_shots.py`).
-"""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionRow:
-    """Shots that differ in their voltage alone, and the leaks under which they are felt; their summaries if known."""
+    """Shots that differ in their voltage alone, and the leaks under which they are felt."""
 
     gun: GunParameters
     voltage_V: tuple[float, ...]
     leaks_s: tuple[float, ...]
-    summaries: tuple[ShotSummary, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -216,61 +208,39 @@ class ShotPercepts:
 def shots(row: FrictionRow) -> list[ShotPercepts]:
     """The shots of a row."""
     guns = [replace(row.gun, voltage_V=voltage_V) for voltage_V in row.voltage_V]
-    summaries = row.summaries or [simulate(gun) for gun in guns]
-    return [shot_of(gun, summary, row.leaks_s) for gun, summary in zip(guns, summaries, strict=True)]
+    return shots_of(guns, simulate_batch(row.gun, voltage_V=row.voltage_V).summaries(), row.leaks_s)
 
 
-def shot_of(gun: GunParameters, summary: ShotSummary, leaks_s: Sequence[float]) -> ShotPercepts:
+def shot_of(gun: GunParameters, leaks_s: Sequence[float]) -> ShotPercepts:
     """One shot from rest and what is felt of it."""
-    status = STATUSES.index(summary.status)
-    if status != HOME or summary.reset_end_s is None:
-        return ShotPercepts(status=status)
-    felt = shot_percepts(gun, summary, leaks_s)
+    return shots_of([gun], [simulator()(gun)], leaks_s)[0]
+
+
+def shots_of(
+    guns: Sequence[GunParameters], summaries: Sequence[ShotSummary], leaks_s: Sequence[float]
+) -> list[ShotPercepts]:
+    """Shots from rest and what is felt of those that come home."""
+    home = [place for place, summary in enumerate(summaries) if _is_home(summary)]
+    felt = percepts_of_shots([guns[place] for place in home], [summaries[place] for place in home], leaks_s)
+    found = [ShotPercepts(status=STATUSES.index(summary.status)) for summary in summaries]
+    for place, percepts in zip(home, felt, strict=True):
+        found[place] = _at_home(guns[place], summaries[place], percepts, leaks_s[0])
+    return found
+
+
+def _is_home(summary: ShotSummary) -> bool:
+    return STATUSES.index(summary.status) == HOME and summary.reset_end_s is not None
+
+
+def _at_home(
+    gun: GunParameters, summary: ShotSummary, felt: tuple[Percept, ...], summary_leak_s: float
+) -> ShotPercepts:
     return ShotPercepts(
-        status=status,
-        period_s=max(summary.reset_end_s, gun.pulse_s),
+        status=HOME,
+        period_s=max(summary.reset_end_s or 0.0, gun.pulse_s),
         felt=felt,
-        by_summary=percept_of_summary(summary, gun.magnet_mass_kg, leaks_s[0]),
+        by_summary=percept_of_summary(summary, gun.magnet_mass_kg, summary_leak_s),
     )
-
-
-def shot_percepts(
-    gun: GunParameters,
-    summary: ShotSummary,
-    leaks_s: Sequence[float],
-    points: tuple[int, int] = (COIL_POINTS, FREE_POINTS),
-) -> tuple[Percept, ...]:
-    """The percept of a shot's full course under each leak. No point falls between two stretches: the force jumps."""
-    times, forces = _course(gun, *points)
-    return tuple(percept_of_course(times, forces, summary, gun.magnet_mass_kg, leak_s) for leak_s in leaks_s)
-
-
-def _course(gun: GunParameters, coil_points: int, free_points: int) -> tuple[list[float], list[float]]:
-    """Times and the force on the hand at both ends of each stretch and evenly in it; 0 from the last rest on."""
-    times: list[float] = []
-    forces: list[float] = []
-    coil: list[Segment] = []
-    for stretch in segments(pack(gun)):
-        if stretch.kind == COIL:
-            coil.append(stretch)
-            continue
-        _extend(times, forces, coil, coil_points)
-        coil = []
-        count = free_points if stretch.kind == FREE else 1
-        for n in range(count + 1 if stretch.end_s < math.inf else 1):
-            at_s = stretch.start_s + (stretch.end_s - stretch.start_s) * n / count if n else stretch.start_s
-            times.append(at_s)
-            forces.append(stretch.force(stretch.at(at_s)))
-    _extend(times, forces, coil, coil_points)
-    return times, forces
-
-
-def _extend(times: list[float], forces: list[float], coil: Sequence[Segment], points: int) -> None:
-    """Add the steps in the coil that follow each other."""
-    if coil:
-        at_s, force_N = coil_forces(coil, points)
-        times += at_s.ravel().tolist()
-        forces += force_N.ravel().tolist()
 
 
 def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...]) -> list[FrictionRow]:
@@ -286,22 +256,18 @@ def rows_of(space: Space, pulses_s: Sequence[float], leaks_s: tuple[float, ...])
     ]
 
 
-def summarised(row: FrictionRow) -> FrictionRow:
-    """The row with its summaries from compiled code; the row as it is without the compiler (extra `fast`)."""
-    if no_compiler():
-        return row
-    return replace(row, summaries=tuple(simulate_batch(row.gun, voltage_V=row.voltage_V).summaries()))
-
-
 def simulate_rows(rows: Sequence[FrictionRow], run: RunPieces, tell: Callable[[str], None]) -> list[list[ShotPercepts]]:
-    """The shots of each row, in their order, wherever they are worked out; `tell` is told of each row's pulse."""
+    """The shots of each row, in their order, wherever they are worked out; `tell` is told of each row's pulse.
+
+    In machine code they are worked out here: a process would load the compiler for longer than it works.
+    """
     found: dict[int, list[ShotPercepts]] = {}
 
     def done(number: int, what: list[ShotPercepts]) -> None:
         found[number] = what
         tell(f"{1e3 * rows[number].gun.pulse_s:.3g} ms, {rows[number].gun.friction_N:.3g} N")
 
-    run(shots, [summarised(row) for row in rows], done)
+    (run if no_compiler() else one_by_one)(shots, rows, done)
     return [found[number] for number in range(len(rows))]
 
 
@@ -337,7 +303,7 @@ def one_more(space: Space, layer: Layer, leak_s: float, more_V: FloatArray) -> t
     for friction_N, row, voltage_V in zip(space.friction_N, layer.felt[leak_s], more_V.tolist(), strict=True):
         more = voltage_V if math.isfinite(voltage_V) else space.voltage_V[0]
         gun = replace(space.gun, pulse_s=layer.pulse_s, friction_N=friction_N, voltage_V=more)
-        shot, place = shot_of(gun, simulate(gun), (leak_s,)), int(np.searchsorted(space.voltage_V, more))
+        shot, place = shot_of(gun, (leak_s,)), int(np.searchsorted(space.voltage_V, more))
         felt.append(np.insert(row, place, _numbers(shot.felt[0] if shot.felt else None), axis=0))
         volts.append(np.insert(space.voltage_V, place, more))
     return np.array(felt), np.array(volts)

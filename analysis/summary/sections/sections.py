@@ -143,10 +143,12 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
 """The reader's order: who, what was found, how sure, what else; then what only some readers look up."""
 
 
-def write_report(out: Path, report: ReportData, tell: Tell = untold) -> None:
+def write_report(
+    out: Path, report: ReportData, tell: Tell = untold, meanwhile: Callable[[], object] = lambda: None
+) -> None:
     """Write `report.html`, `report.md`, `statistics.json` and `figures/` into `out`, which is made if need be.
 
-    `tell` of "figures" and of "pages".
+    `tell` of "figures" and of "pages". `meanwhile` is done while copies of this process still draw.
 
     Files of an earlier report there are replaced. The same data give the same bytes.
     """
@@ -160,6 +162,7 @@ def write_report(out: Path, report: ReportData, tell: Tell = untold) -> None:
             write_figures(out / "figures", report)
             for one in report.apart:
                 write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
+            meanwhile()
         tell("figures")
         parts = sections(report)
         write_page(out, report.title, (*parts, *names_in_full()), head)
