@@ -27,6 +27,7 @@ from analysis.predict.fit.studies import (
 )
 from analysis.predict.synthetic_studies import piece_sizes, spread_sentence
 from analysis.report import apa, placing
+from analysis.report.copies import process_copies
 from analysis.report.labels import display_name, labelled
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
@@ -61,7 +62,9 @@ def percept(request: PerceptRequest, out: Path, progress: Progress) -> FittedPer
         found = replace(found, judged=judged)
         storage.write_whole(part / placing.FIT_FILE, as_json(found))
         storage.write_whole(part / "percept.toml", config_text(found).encode())
-        write_page(part, f"The percept fitted to {found.source}", sections(found, histograms, part / "figures"))
+        with process_copies():
+            parts = sections(found, histograms, part / "figures")
+        write_page(part, f"The percept fitted to {found.source}", parts)
     return found
 
 
