@@ -180,7 +180,10 @@ def design(
     rate_above: RateAboveOption = 5.0,
     grid: GridOption = 40,
     seed: FixedSeedOption = 1,
-    workers: WorkersOption = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes, if shots are interpreted (no extra `fast`); all cores unless given."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for design.json, figures and report.")] = Path("results/design"),
     as_json: AsJsonOption = False,
 ) -> None:
