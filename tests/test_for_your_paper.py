@@ -42,7 +42,7 @@ def reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reported:
 
     def run(*paths: Path, **asked: object) -> ReportData:
         found: list[ReportData] = []
-        monkeypatch.setattr(sections, "write_report", lambda _, report, __: found.append(report))
+        monkeypatch.setattr(sections, "write_report", lambda _, report, *__, **___: found.append(report))
         feature.analyze(feature.Request(paths=paths, out=tmp_path / f"out-{next(numbers)}", **asked))  # type: ignore[arg-type]
         return found[0]
 

@@ -230,7 +230,7 @@ def test_a_linear_model_of_right_and_wrong_says_that_another_is_meant_for_them(l
 def test_what_data_that_are_kept_apart_have_not_is_a_warning_and_the_rest_is_answered(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("analysis.summary.sections.sections.write_report", lambda *_: None)  # it takes longest
+    monkeypatch.setattr("analysis.summary.sections.sections.write_report", lambda *_, **__: None)  # it takes longest
     hands = {"A": ("participant", "RG-2:0007"), "S": ("synthetic", "simulated")}
     for letter, (hand, gun) in hands.items():
         for seed in (1, 2, 3):
