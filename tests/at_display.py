@@ -28,6 +28,7 @@ needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb and openbox")
 HAND_S = 1.5 * BOUNCE_S
 """A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
 OTHER = "another program's window"
+_RIGHT_BUTTON = 3
 BUSY = ("saving", "firing", "stopped")
 """States in which nobody is waited for."""
 
@@ -121,6 +122,18 @@ class AtDisplay:
             ended = self.process.poll()
             raise AssertionError(f"no window {title!r} was shown (exit code {ended}); the program said: {self.kill()}")
         return place
+
+    def ask_for_menu(self, *places: tuple[int, int]) -> None:
+        """Click places of the screen with the mouse's right button."""
+        from Xlib import X
+        from Xlib.ext import xtest
+
+        display = self.keys.display
+        for x, y in places:
+            xtest.fake_input(display, X.MotionNotify, x=x, y=y)
+            for event in (X.ButtonPress, X.ButtonRelease):
+                xtest.fake_input(display, event, _RIGHT_BUTTON)
+            display.sync()
 
     def kill(self) -> str:
         """`kill -9`; what was said until then."""

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
+from tests.at_display import HAND_S, AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, SHORT_TRIALS, answers, rows, shorten, words
 from tests.warm_start import warm
 from tests.watched_console import Watch
@@ -21,6 +21,8 @@ pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
 
 START = "Recoil – start"
+NOTE_LINE = (300, 610)
+"""Where a note is typed, on a screen of 1280x800."""
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +103,20 @@ def test_a_training_leaves_nothing_behind(quick_configs: Path, tmp_path: Path, d
         code, said = close_the_day(screen)
     assert code == 0, said
     assert not list(tmp_path.glob("results/sub-*"))
+
+
+def test_no_menu_takes_the_keys_of_a_run(quick_configs: Path, tmp_path: Path, display: str) -> None:
+    with AtConsole(words(quick_configs, "direction", "--participant", "P01"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking")
+        screen.keys.press("n")
+        screen.until(lambda look: look.says("Note on trial 1"))
+        screen.ask_for_menu(NOTE_LINE)
+        time.sleep(HAND_S)
+        screen.keys.press("F12")
+        screen.at("halted")
+        screen.keys.press("q")
+        screen.close()
 
 
 @pytest.mark.parametrize("practises", [True, False], ids=["practice", "run"])

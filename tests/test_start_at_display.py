@@ -243,6 +243,30 @@ def test_a_signal_in_a_test_shot_disarms_and_ends_it(pilot: Path, display: str) 
     assert not any("Fired" in look["texts"] for look in watched_start.seen(eye))
 
 
+@pytest.mark.parametrize(("key", "ends"), [("F12", "EMERGENCY STOP"), ("Escape", "Not fired")])
+def test_no_menu_takes_the_keys_of_a_test_shot(pilot: Path, display: str, key: str, ends: str) -> None:
+    """Every line of text has one elsewhere, of which the first key and the first click are."""
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        screen.keys.press("t", "Control_L")
+        wait_for(eye, having("STAND CLEAR"))
+        screen.ask_for_menu(*((300, y) for y in range(60, 400, 40)))
+        screen.keys.press(key)
+        wait_for(eye, having(ends, "Nothing was fired."))
+    assert not any("Fired" in look["texts"] for look in watched_start.seen(eye))
+
+
+def test_f12_is_heard_while_a_menu_is_open(pilot: Path, display: str) -> None:
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        screen.ask_for_menu((300, 40))
+        time.sleep(HAND_S)
+        screen.keys.press("F12")
+        wait_for(eye, having("F12 is heard."))
+        screen.keys.press("q", "Control_L")  # the menu is closed
+        assert screen.end()[0] == 0
+
+
 def test_a_signal_in_a_run_ends_the_day_as_well(pilot: Path, display: str) -> None:
     journal = pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl"
     with started(pilot, display) as (screen, eye):
