@@ -39,9 +39,11 @@ from experiments.record.journal import (
 )
 from experiments.record.journal import head as journal_head
 from experiments.record.names import Place
+from experiments.record.owed_shot import owed_shots
 from experiments.record.provenance import provenance
 from experiments.record.rebuild import began_with, shots_table, table
 from experiments.record.replay import RunPosition
+from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest, resolve_seed
 from experiments.runner import Desk, carry_out
 from experiments.session.design_session import design_session
@@ -165,7 +167,12 @@ def _refuse_person(request: RunRequest, place: Place, registered: Register) -> N
 
 @contextmanager
 def _open_gun(request: RunRequest, stimuli: Stimuli, clock: Clock) -> Iterator[Gun]:
-    """The gun, closed at the end. A gun that cannot be closed does not hide why the run ended."""
+    """The gun, closed at the end. A gun that cannot be closed does not hide why the run ended.
+
+    `JournalError`: whether it owes a test shot cannot be read; that is said before anything begins.
+    """
+    if not is_simulated(request.gun):
+        owed_shots(request.results)
     try:
         gun = open_gun(request.gun, stimuli.methods, clock=clock.now)
     except ValueError as error:

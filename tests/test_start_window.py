@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,11 +29,11 @@ from experiments.catalogues.catalogue import ENGLISH, language
 from experiments.clock import RealClock, VirtualClock
 from experiments.live_run import RunStopped
 from experiments.load import load_setup
-from experiments.record.journal import hold_journal
+from experiments.record.journal import JournalError, hold_journal
 from experiments.record.owed_shot import OWED_FILE, OwedShot, owe_shot, owed_shots, shot_was_fired
 from experiments.run import run
 from experiments.run_request import ParticipantOptions, RunRequest
-from experiments.screens.console import live, widgets
+from experiments.screens.console import live, shot_check, widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening, PeopleTable
 from experiments.screens.console.live import study_of
@@ -1110,11 +1113,8 @@ def test_after_an_emergency_stop_of_a_test_shot_nothing_begins_before_one_was_fi
 def test_a_test_shot_that_an_emergency_stop_left_owed_is_owed_in_later_windows_too(
     opened: Open, study: StudyFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tests.twins import a_twin
-
     monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
-    with a_twin(tmp_path, speed=1.0) as (_, socket):
-        gun = f"serial:{socket.address}"
+    with a_gun(tmp_path) as gun:
         first = opened(gun=gun)
         key(first, "T", CTRL)
         until(lambda: first.shots.count.text() != "")
@@ -1125,8 +1125,18 @@ def test_a_test_shot_that_an_emergency_stop_left_owed_is_owed_in_later_windows_t
         assert said(window) == "The last test shot ended by an emergency stop."
         fill(window, "P01")
         is_asked_for_a_test_shot(window, "Return")
-    assert not owed_shots(study.results)
+        until(lambda: not owed_shots(study.results))
     assert not opened(gun=gun).shots.owed
+
+
+@contextmanager
+def a_gun(folder: Path, serial: str = "7") -> Iterator[str]:
+    """The address of a gun on a line, which calls itself no twin."""
+    from device.twin.core import IDENTITY
+    from tests.twins import a_twin
+
+    with a_twin(folder, speed=1.0, identity=replace(IDENTITY, serial=serial)) as (_, socket):
+        yield f"serial:{socket.address}"
 
 
 def test_a_simulated_gun_owes_nothing(opened: Open, study: StudyFolder) -> None:
@@ -1198,37 +1208,129 @@ def test_a_key_pressed_behind_a_test_shot_neither_stops_nor_fires(
     assert not window.shots.is_running
 
 
+def stopped_with(obstacle: Callable[[], object], window: StartWindow) -> None:
+    """A test shot is stopped where something is in the way of its record, which is said."""
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    obstacle()
+    key(window, "F12")
+    until(lambda: not window.shots.is_running)
+    until(lambda: window.shots.detail.toPlainText().count(UNKEPT) == 1)
+    assert "The gun reports: disarmed." in window.shots.detail.toPlainText()
+
+
+UNKEPT = f"{OWED_FILE} does not keep that a test shot is owed ("
+
+
 @pytest.mark.parametrize("away", [True, False])
-def test_it_is_said_where_the_disk_does_not_keep_that_a_test_shot_is_owed(
-    away: bool, opened: Open, study: StudyFolder, tmp_path: Path
+@pytest.mark.parametrize("closes", [True, False])
+def test_that_a_test_shot_is_owed_is_kept_as_soon_as_the_disk_takes_it(
+    away: bool, closes: bool, opened: Open, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("experiments.record.owed_shot.RETRY_S", 3600.0 if closes else 0.01)
+    results, file, elsewhere = study.results, study.results / OWED_FILE, study.results.with_name("away")
+    results.mkdir(exist_ok=True)
+    with a_gun(results.parent) as gun:
+        window = opened(gun=gun)
+        stopped_with(lambda: results.rename(elsewhere) if away else file.mkdir(), window)
+    assert not (away and results.exists())
+    if away:
+        elsewhere.rename(results)
+    else:
+        file.rmdir()
+    if closes:
+        window.close()
+        window.shots.end(wait=True)
+    else:
+        until(lambda: UNKEPT not in window.shots.detail.toPlainText())
+    assert [(one.gun, one.address) for one in owed_shots(results)] == [("haptic-gun:7", gun)]
+
+
+def test_what_is_owed_and_not_kept_when_the_window_closes_is_said(
+    opened: Open, study: StudyFolder, tmp_path: Path
+) -> None:
+    study.results.mkdir(exist_ok=True)
+    with a_gun(tmp_path) as gun:
+        window = opened(gun=gun)
+        stopped_with((study.results / OWED_FILE).mkdir, window)
+    window.close()
+    with pytest.raises(JournalError, match=re.escape(f"{UNKEPT}Is a directory)")):
+        window.shots.end(wait=True)
+
+
+def test_what_is_fired_before_the_stop_is_kept_is_not_owed(
+    opened: Open, study: StudyFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
+    study.results.mkdir(exist_ok=True)
+    with a_gun(tmp_path) as gun:
+        window = opened(gun=gun)
+        stopped_with((study.results / OWED_FILE).mkdir, window)
+        key(window, "Escape")
+        is_asked_for_a_test_shot(window, "R")
+        assert UNKEPT not in window.shots.detail.toPlainText()
+    (study.results / OWED_FILE).rmdir()
+    window.close()
+    window.shots.end(wait=True)
+    assert not owed_shots(study.results)
+
+
+def test_what_stands_in_place_of_the_owed_test_shots_is_one_message(study: StudyFolder) -> None:
+    """Of a window as of a run, before anything has begun; a simulated gun owes nothing."""
+    (study.results / OWED_FILE).mkdir(parents=True)
+    said = (
+        f"{study.results / OWED_FILE}: cannot be read (Is a directory), and says which guns owe a test shot after an "
+        "emergency stop; have it readable, or put away what stands there and fire a test shot before anything else"
+    )
+    with pytest.raises(JournalError, match=f"^{re.escape(said)}$"):
+        StartWindow(study, Opening(gun=SERIAL), RealClock())
+    request = RunRequest(setup=load_setup("direction"), participant_id="P01", results=study.results, screen="terminal")
+    with pytest.raises(JournalError, match=f"^{re.escape(said)}$"):
+        run(replace(request, gun=SERIAL), synthetic_screen, VirtualClock())
+    assert not place(study.results, "P01", "direction").folder.exists()
+    assert run(request, synthetic_screen, VirtualClock()).saved
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_twin_owes_a_test_shot_to_its_window_alone(
+    named: bool, opened: Open, study: StudyFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As every simulated gun; also where it was stopped before anybody knew what it is."""
     from tests.twins import a_twin
 
-    study.results.mkdir(exist_ok=True)
+    opens, may_open = shot_check.open_gun, threading.Event()
+
+    def open_gun(*args: Any, **more: Any) -> Any:
+        assert may_open.wait(PATIENCE_S)
+        return opens(*args, **more)
+
+    monkeypatch.setattr("experiments.screens.console.shot_check.open_gun", open_gun)
+    other = OwedShot(utc="2026-01-01T00:00:00.000+00:00", gun="shaker:8", address=SERIAL)
+    owe_shot(study.results, other)
     with a_twin(tmp_path, speed=1.0) as (_, socket):
         window = opened(gun=f"serial:{socket.address}")
         key(window, "T", CTRL)
-        until(lambda: window.shots.count.text() != "")
-        if away:
-            study.results.rename(study.results.with_name("away"))
-        else:
-            (study.results / OWED_FILE).mkdir()
+        if named:
+            may_open.set()
+            until(lambda: window.shots.count.text() != "")
         key(window, "F12")
+        if not named:
+            until(lambda: len(owed_shots(study.results)) == 2)
+            may_open.set()
         until(lambda: not window.shots.is_running)
-        unkept = "does not keep that a test shot is owed"
-        until(lambda: window.shots.detail.toPlainText().count(unkept) == 1)
-        assert "The gun reports: disarmed." in window.shots.detail.toPlainText()
-    assert not (away and study.results.exists())
+        assert window.shots.owed
+        window.close()
+        window.shots.end(wait=True)
+        assert owed_shots(study.results) == [other]
+        assert not opened(gun=f"serial:{socket.address}").shots.owed
 
 
 def test_an_emergency_stop_behind_a_test_shot_counts(
     opened: Open, study: StudyFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tests.twins import a_twin
-
     monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 0)
-    with a_twin(tmp_path, speed=1.0) as (_, socket):
-        window = opened(gun=f"serial:{socket.address}")
+    with a_gun(tmp_path) as gun:
+        window = opened(gun=gun)
         key(window, "T", CTRL)
         until(lambda: not window.shots.is_running)
         fired = window.shots.detail.toPlainText()
@@ -1243,7 +1345,7 @@ def test_an_emergency_stop_behind_a_test_shot_counts(
         assert owed.gun
         key(window, "Escape")
         is_asked_for_a_test_shot(window, "R")
-    assert not owed_shots(study.results)
+        until(lambda: not owed_shots(study.results))
 
 
 def test_a_window_that_is_closed_in_a_test_shot_stops_it_first(opened: Open) -> None:

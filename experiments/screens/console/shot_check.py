@@ -6,12 +6,11 @@ before it fires, so that nothing of this test fires after it, whatever the gun d
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from errno import ENOENT
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -25,7 +24,8 @@ from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
 from experiments.earlier_run import owes_shot
-from experiments.record.owed_shot import OwedShot, owe_shot, shot_was_fired
+from experiments.record.journal import JournalError
+from experiments.record.owed_shot import OWED_FILE, DebtKeeper, OwedShot, owe_shot, shot_was_fired, take_back
 from experiments.record.tables import is_simulated
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
@@ -221,10 +221,12 @@ class ShotPage(QWidget):
         """The emergency stop: nothing is fired from this page until it was left, and entered on purpose."""
         self.owed = not is_simulated(gun) and owes_shot(results, gun)
         """After an emergency stop, also of an earlier window, until a test shot was fired."""
-        self._gun_name, self._had_results = "", results.is_dir()
+        self._keeper = DebtKeeper(results, self.unkept.emit)
+        self._debt: OwedShot | None = None
         self._method_at = 0
         self.over: Callable[[], None] = lambda: None
-        self._unkept = self._why = ""
+        self._gun_name = self._unkept = self._why = ""
+        self._shown_detail = ("", "wait")
         self.told.connect(self._take)
         self.unkept.connect(self._say_unkept)
         self._build()
@@ -246,6 +248,11 @@ class ShotPage(QWidget):
         kept = self.next_button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)
         self.next_button.setSizePolicy(kept)
+
+    @property
+    def owed_text(self) -> str:
+        """Why a test shot comes first; empty where none is owed."""
+        return phrase("The last test shot ended by an emergency stop.") if self.owed else ""
 
     @property
     def is_running(self) -> bool:
@@ -294,38 +301,54 @@ class ShotPage(QWidget):
             self._check.emergency_stop()
             self._gun_name = self._check.gun_name
         is_new, self.stopped, self.owed = not self.stopped, True, True
-        if is_new and not is_simulated(self._gun):
-            self._unkept = ""
-            threading.Thread(target=self._owe, name="owed").start()  # a disk may take its time
+        if is_new:
+            self._owe()
         over = phrase(
             "{outcome} That was over when you stopped it: a test shot comes first, whatever is done next.",
-            outcome=self.detail.toPlainText(),
+            outcome=self._shown_detail[0],
         )
         self._show(phrase("EMERGENCY STOP"), DISARMING if self.is_running else over, "bad")
         self._running(self.is_running)
 
     def _owe(self) -> None:
-        try:
-            if self._had_results and not self._results.is_dir():  # a new one would be in its way back
-                raise FileNotFoundError(ENOENT, os.strerror(ENOENT))
-            owe_shot(self._results, OwedShot(utc=self._clock.utc(), gun=self._gun_name, address=self._gun))
-        except OSError as error:
-            self.unkept.emit(error.strerror or str(error))
+        if self._is_simulated:
+            return
+        self._debt = OwedShot(utc=self._clock.utc(), gun=self._gun_name, address=self._gun)
+        self._keeper.keep(partial(owe_shot, self._results, self._debt))
+
+    def _settle(self, *, fired: bool) -> None:
+        """What was owed is fired, or the gun that was stopped before it said its name is a simulated one."""
+        if self._debt is not None and not self._debt.gun and self._is_simulated:
+            self._keeper.keep(partial(take_back, self._results, self._debt))
+        elif fired and not self.owed and not is_simulated(self._gun):
+            self._keeper.keep(partial(shot_was_fired, self._results, self._gun_name, self._gun))
+        self._debt = None
+
+    @property
+    def _is_simulated(self) -> bool:
+        """Nobody who comes later is in danger: such a gun owes a test shot to this window alone, also on a line."""
+        return is_simulated(self._gun) or is_simulated(self._gun_name)
 
     def _say_unkept(self, why: str) -> None:
-        """The stop is not on the disk: only this window knows of it."""
-        self._unkept = phrase(
-            "{results} does not keep that a test shot is owed ({why}): fire it before you close this window.",
-            results=self._results.resolve(),
-            why=why,
-        )
-        self.detail.say(f"{self.detail.toPlainText()} {self._unkept}", "bad")
+        """Whether the stop is not on the disk yet: only this window knows of it."""
+        meanwhile = phrase("That is tried again until this window closes: see to the file, or fire a test shot before.")
+        self._unkept = why and self._unkept_text(why, meanwhile)
+        self._show_detail()
 
-    def _settle(self) -> None:
-        """What was owed is fired."""
-        if not self.owed:
-            with suppress(OSError):  # one test shot more is asked for then
-                shot_was_fired(self._results, self._gun_name, self._gun)
+    def _unkept_text(self, why: str, what_then: str) -> str:
+        return phrase(
+            "{file} does not keep that a test shot is owed ({why}). {what_then}",
+            file=self._results.resolve() / OWED_FILE,
+            why=why,
+            what_then=what_then,
+        )
+
+    def end(self, *, wait: bool) -> None:
+        """Nothing more comes of this page. `JournalError`, where it is waited for that: what is owed is not kept."""
+        self._keeper.end(wait=wait)
+        if wait and self.owed and self._keeper.why:
+            what_then = phrase("Nobody will be asked for it: fire one before anything else is done with the gun.")
+            raise JournalError(self._unkept_text(self._keeper.why, what_then))
 
     def call_off(self, why: str = "") -> None:
         """Fire no more, if it has not fired."""
@@ -362,7 +385,7 @@ class ShotPage(QWidget):
         if told.fired:
             self._method_at += 1
             self.owed = self.stopped
-            self._settle()
+        self._settle(fired=told.fired)
         title = phrase("EMERGENCY STOP") if self.stopped else phrase("Fired") if told.fired else phrase("Not fired")
         self._show(title, told.text if told.fired else " ".join(filter(None, [why, told.text])), told.mood)
         self._running(False)
@@ -371,8 +394,14 @@ class ShotPage(QWidget):
     def _show(self, title: str, detail: str, mood: str) -> None:
         self.title.setText(title)
         widgets.set_mood(self.title, mood)
-        self.detail.say(" ".join(filter(None, [detail, self._unkept if self.owed else ""])), mood)
+        self._shown_detail = detail, mood
+        self._show_detail()
         self.count.setText("")
+
+    def _show_detail(self) -> None:
+        detail, mood = self._shown_detail
+        unkept = self._unkept if self.owed else ""
+        self.detail.say(" ".join(filter(None, [detail, unkept])), "bad" if unkept else mood)
 
     def _running(self, running: bool) -> None:
         if not running:

@@ -39,7 +39,6 @@ _NAME = "start"
 _Found = TypeVar("_Found")
 SIMULATED = "simulated"
 NOTHING_ARMED = phrase("F12 is heard. Nothing is armed here: it stops test shots, practices and runs.")
-STOPPED = phrase("The last test shot ended by an emergency stop.")
 
 
 class StartWindow(QtWidgets.QWidget):
@@ -152,8 +151,7 @@ class StartWindow(QtWidgets.QWidget):
         entered, bad = self.form.entered(), [*filter(None, [opening.said]), *self._seen.problems]
         code, experiment = entered.participant_id, entered.experiment
         named = people.named_text(opening.named, code, self._person(code), experiment)
-        owed = STOPPED if self.shots.owed else ""
-        told = filter(None, [owed, named, people.changed_text(self._seen)])
+        told = filter(None, [self.shots.owed_text, named, people.changed_text(self._seen)])
         self.say("\n".join([*bad, *told]), "bad" if bad else "ask")
 
     def _propose(self, participant_id: str) -> None:
@@ -214,6 +212,7 @@ class StartWindow(QtWidgets.QWidget):
             event.ignore()
             return
         super().closeEvent(event)
+        self.shots.end(wait=False)
         windows.remember(self, _NAME)
         self.closed.emit()
 
@@ -409,8 +408,8 @@ class StartWindow(QtWidgets.QWidget):
 
     def _shot_is_owed(self) -> bool:
         """Whether a test shot comes before all else, as the last one ended by an emergency stop: it is asked for."""
-        if self.shots.owed:
-            text = phrase("{stopped} A test shot comes first. Is the gun where it hurts nobody?", stopped=STOPPED)
+        if stopped := self.shots.owed_text:
+            text = phrase("{stopped} A test shot comes first. Is the gun where it hurts nobody?", stopped=stopped)
             sure = Option(text=phrase("It is: test shot"), key="Ctrl+S", do=lambda _: self._enter_shots())
             self._ask(QuestionBox(text, (sure, self._leave_it())))
         return self.shots.owed
@@ -435,12 +434,12 @@ class StartWindow(QtWidgets.QWidget):
     def _leave_shots(self) -> None:
         self.pages.setCurrentIndex(0)
         self._show_choice()
-        self.say(STOPPED if self.shots.owed else "", "bad")
+        self.say(self.shots.owed_text, "bad")
         self.form.code_again.setFocus()
 
 
 def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest | None:
-    """Show the start window until something is chosen; `None` if it was closed, or a signal ended it."""
+    """Show the start window until something is chosen; `None`, if nothing was. `JournalError` as of its test shots."""
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()
     window.closed.connect(loop.quit)
@@ -449,6 +448,7 @@ def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest
         windows.FreshShortcuts(window)
         window.activateWindow()
         loop.exec()
+    window.shots.end(wait=True)
     choice = window.choice
     windows.let_go(window)
     return choice
