@@ -340,8 +340,13 @@ def test_nobody_begins_anew_where_the_results_folder_is_gone(emptied: bool, open
         key(window, "Return", CTRL)
         assert window.choice is None
         assert "all that was in it is gone" in said(window)
+        assert not remark(window)
+        assert window.next.toPlainText().startswith("Nobody can be named next")
         key(window, "P", CTRL)
         assert window.choice is None
+    window.form.markers.toggle()  # takes the refusal back
+    assert "all that was in it is gone" in remark(window)
+    assert not said(window)
     assert not list(study.results.glob("*"))
     if emptied:
         study.results.rmdir()
@@ -362,6 +367,7 @@ def test_nobody_begins_anew_either_where_the_results_folder_went_while_they_ran(
     study.results.rename(study.results.with_name("away"))
     window = opened(**opening)
     assert "all that was in it is gone" in said(window)
+    assert not remark(window)
     fill(window, "P02")
     key(window, "Return", CTRL)
     assert window.choice is None
@@ -406,6 +412,17 @@ def test_nobody_begins_where_the_register_is_gone_which_says_who_is_excluded(ope
     assert window.choice is not None
 
 
+def test_that_somebody_is_new_gives_way_to_why_they_may_not_begin(opened: Open) -> None:
+    window = opened()
+    fill(window, "P03", again="P04")
+    assert remark(window) == "P03 is new."
+    key(window, "Return", CTRL)
+    assert said(window).startswith("The two codes differ: P03 and P04.")
+    assert not remark(window)
+    window.form.code_again.setText("P03")
+    assert (remark(window), said(window)) == ("P03 is new.", "")
+
+
 def test_somebody_whose_logs_are_gone_does_not_begin_anew(opened: Open, study: StudyFolder) -> None:
     for code in ("P01", "P02"):
         join(study, code)
@@ -418,6 +435,9 @@ def test_somebody_whose_logs_are_gone_does_not_begin_anew(opened: Open, study: S
     assert window.choice is None
     assert f"{folder.resolve()}: was there, and is gone" in said(window)
     assert not folder.exists()
+    assert not remark(window)
+    window.form.markers.toggle()
+    assert f"{folder.resolve()}: was there, and is gone" in remark(window)
     fill(window, "P02")
     key(window, "Return", CTRL)
     assert "Go on there, or set it aside" in question(window)

@@ -1,14 +1,16 @@
-"""How participants stand, in the sentences of the start window. Pure."""
+"""How participants stand, in the sentences of the start window."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
 
 from experiments.clock import date_text
 from experiments.record.names import is_code
 from experiments.screens.phrases import phrase
-from experiments.study.enrolment import left_to_do, passed_over, run_of
-from experiments.study.folders import Overview
+from experiments.screens.texts import doubt_text
+from experiments.study.enrolment import Entered, code_doubt, left_to_do, passed_over, run_of
+from experiments.study.folders import Overview, PlaceError, StudyFolder, refuse_gone
 from experiments.study.study import Participant, RunProgress, taking_part
 
 _CELL = {"done": "done", "not begun": "–", "unreadable": phrase("cannot be read"), "synthetic": "synthetic"}
@@ -62,7 +64,7 @@ def coming_text(seen: Overview) -> str:
     elsewhere = [one.participant_id for one in counted if one.is_elsewhere]
     if elsewhere:
         return phrase("Nobody waits; at another console now: {elsewhere}.", elsewhere=", ".join(elsewhere))
-    done = all(run.state == "done" for one in counted for run in one.runs)
+    done = counted and all(run.state == "done" for one in counted for run in one.runs)
     return (
         phrase("Everyone has done everything.")
         if done
@@ -98,6 +100,18 @@ def named_text(named: str, code: str, person: Participant | None, experiment: st
         code=code,
         experiment=experiment,
     )
+
+
+def remark_of_choice(entered: Entered, study: StudyFolder, seen: Overview, had: Collection[Path]) -> tuple[str, str]:
+    """As `remark`, of who is chosen in a study; before it that their files are gone, or that the code is in doubt."""
+    code = entered.participant_id
+    try:
+        refuse_gone(study.results, had, code)
+    except PlaceError as error:
+        return str(error), "bad"
+    known = {one.participant_id: one for one in seen.participants}
+    doubt = code_doubt(code, [*known], study.config.code_prefix)
+    return (doubt_text(doubt), "ask") if doubt else remark(code, known.get(code), entered.experiment, study.experiments)
 
 
 def remark(code: str, person: Participant | None, experiment: str, experiments: Sequence[str]) -> tuple[str, str]:

@@ -22,7 +22,6 @@ from experiments.screens.console.form import Form, Opening, PeopleTable
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.phrases import phrase
-from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
 from experiments.study.folders import (
     Overview,
@@ -52,7 +51,7 @@ class StartWindow(QtWidgets.QWidget):
         self.choice: RunRequest | None = None
         self.question: QuestionBox | None = None
         self._simulation_is_known = False
-        self._closing = self._was_left = False
+        self._closing = self._was_left = self._refuses = False
         self._scale = 0.0
         self._build()
         self._fill()
@@ -127,7 +126,8 @@ class StartWindow(QtWidgets.QWidget):
         except RecoilError as error:
             unread += str(error).splitlines()
         seen = overview(self._study)
-        self._seen: Overview = replace(seen, problems=tuple(dict.fromkeys([*unread, *seen.problems])))
+        self._is_unread, problems = bool(unread), tuple(dict.fromkeys([*unread, *seen.problems]))
+        self._seen: Overview = replace(seen, problems=problems, next=None if unread else seen.next)
         self._opening.had.update(files_of_people(self._study.results))
         self.table.show_people(self._seen.participants)
         self.next.say(people.coming_text(self._seen))
@@ -152,7 +152,7 @@ class StartWindow(QtWidgets.QWidget):
         code, experiment = entered.participant_id, entered.experiment
         named = people.named_text(opening.named, code, self._person(code), experiment)
         told = filter(None, [self.shots.owed_text, named, people.changed_text(self._seen)])
-        self.say("\n".join([*bad, *told]), "bad" if bad else "ask")
+        self.say("\n".join([*bad, *told]), "bad" if bad else "ask", refuses=self._is_unread)
 
     def _propose(self, participant_id: str) -> None:
         """Who was there before if they have something left to do, else who comes next."""
@@ -173,13 +173,14 @@ class StartWindow(QtWidgets.QWidget):
         self.form.experiment.setCurrentText(enrolment.next_experiment(person, self._study.experiments))
         self._show_choice()
 
+    def _show_remark(self) -> None:
+        """What there is to know of who is chosen, where nothing says that they may not begin."""
+        said = people.remark_of_choice(self.form.entered(), self._study, self._seen, self._opening.had)
+        self.form.remark.say(*("", "") if self._refuses else said)
+
     def _show_choice(self) -> None:
-        code, experiment = self.form.participant_id, self.form.experiment.currentText()
-        person = self._person(code)
-        known = [one.participant_id for one in self._seen.participants]
-        doubt = enrolment.code_doubt(code, known, self._study.config.code_prefix)
-        said = (doubt_text(doubt), "ask") if doubt else people.remark(code, person, experiment, self._study.experiments)
-        self.form.remark.say(*said)
+        self._show_remark()
+        person = self._person(self.form.participant_id)
         out = person is not None and bool(person.gone)
         self.exclude_button.setText(f"{phrase('Readmit…') if out else phrase('Exclude…')}  [Alt+E]")
         self.shots.choose(self._setup())
@@ -216,14 +217,11 @@ class StartWindow(QtWidgets.QWidget):
         windows.remember(self, _NAME)
         self.closed.emit()
 
-    def leave_for(self, signal: str) -> None:
-        """Close without a choice: a signal came, which whoever made this window hears of as well."""
-        del signal
-        self.close()
-
-    def say(self, text: str, mood: str) -> None:
-        """Show a line of answer."""
+    def say(self, text: str, mood: str, *, refuses: bool = False) -> None:
+        """Show a line of answer; where it refuses somebody, what else there is to know of them gives way to it."""
         self.saved.say(text, mood)
+        self._refuses = refuses
+        self._show_remark()
 
     # questions
 
@@ -298,7 +296,7 @@ class StartWindow(QtWidgets.QWidget):
         """What stands in the window may be old: look again, then say the reason."""
         self._fill()
         self._show_choice()
-        self.say(reason, "bad")
+        self.say(reason, "bad", refuses=True)
 
     def _ask_simulation(self, asked: str, sure: str, go_on: Callable[[], None]) -> None:
         def known(_: str) -> None:
@@ -443,7 +441,7 @@ def choose_run(study: StudyFolder, opening: Opening, clock: Clock) -> RunRequest
     window = StartWindow(study, opening, clock)
     loop = QEventLoop()
     window.closed.connect(loop.quit)
-    with windows.signals_to(window.leave_for):
+    with windows.signals_to(lambda _: window.close()):  # whoever asks for a choice hears of it as well
         windows.open_as_left(window, _NAME)
         windows.FreshShortcuts(window)
         window.activateWindow()

@@ -124,7 +124,7 @@ WAKE_MS = 100
 
 
 @contextmanager
-def signals_to(leave: Callable[[str], None] | None = None) -> Iterator[list[str]]:
+def signals_to(leave: Callable[[str], object] | None = None) -> Iterator[list[str]]:
     """Have the signals of `INTERRUPTS` call `leave` with the signal's name; gives the names of those that came.
 
     `leave` is called by Qt's event loop, never in the midst of what was going on, such as painting. Without `leave`,
@@ -169,7 +169,7 @@ def _wake() -> QtCore.QTimer:
 
 @dataclass(frozen=True, slots=True)
 class _Handler:
-    leave: Callable[[str], None] | None
+    leave: Callable[[str], object] | None
     before: dict[int, Any]
     came: list[str]
 
