@@ -12,7 +12,8 @@ from shutil import copytree
 import pytest
 
 from analysis.archive.archive_export import ArchiveRequest, export_archive
-from analysis.archive.making import preregistration_faults
+from analysis.archive.making import PREREGISTRATION, preregistration_faults
+from analysis.archive.manifest import ArchiveFault
 from analysis.archive.preregistration import Frozen, freeze
 from analysis.logs.reading import read_logs
 from analysis.predict.check import check, check_text
@@ -725,7 +726,7 @@ def test_a_forger_who_makes_a_new_hash_is_found_by_the_journals_and_by_the_amend
     assert any(f"no preregistration {first.short} that can be trusted" in one and "P01" in one for one in problems)
 
 
-def faults_in_archive(study: Path) -> list[str]:
+def faults_in_archive(study: Path) -> list[ArchiveFault]:
     """What is wrong with the preregistrations of a folder that has them where an archive does."""
     (study / "preregistration").mkdir()
     for path in study.glob("preregistration-*"):
@@ -734,10 +735,16 @@ def faults_in_archive(study: Path) -> list[str]:
 
 
 def test_a_freeze_in_an_archive_is_held_against_the_journals_there(begun: Path) -> None:
-    assert ["the journals of P01 name" in one for one in preregistration_faults(begun)] == [True]
+    (gone,) = preregistration_faults(begun)
+    assert (gone.file, gone.said.endswith(" that can be trusted, which the journals of P01 name")) == (
+        PREREGISTRATION,
+        True,
+    )
     assert faults_in_archive(begun) == []
     forged(begun / "preregistration" / "preregistration-1.json", "value")
-    assert preregistration_faults(begun)[0].startswith("preregistration/preregistration-1.json: was edited")
+    edited_one, _ = preregistration_faults(begun)
+    assert edited_one.file == "preregistration/preregistration-1.json"
+    assert re.fullmatch("was edited: its content has the hash [0-9a-f]{12}, and it says [0-9a-f]{12}", edited_one.said)
 
 
 @pytest.mark.slow
@@ -766,7 +773,7 @@ def test_a_freeze_with_what_is_no_number_ends_no_command(begun: Path, number: st
     with pytest.raises(PreregistrationError, match="was edited"):
         freeze(begun, "", RealClock())
     assert any(one.startswith(named) for one in deviations(read_logs([begun / "results"]), AnalysisFiles())[1])
-    assert any("was edited" in one for one in faults_in_archive(begun))
+    assert any("was edited" in one.said for one in faults_in_archive(begun))
 
 
 def test_a_freeze_with_a_hash_of_its_own_whose_study_is_none_is_named(frozen: Path) -> None:

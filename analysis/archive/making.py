@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
 from analysis.archive import bids_export
 from analysis.archive.contents import left_out_in
+from analysis.archive.manifest import ArchiveFault
 from analysis.logs.files import ARCHIVE_FILE
 from analysis.logs.reading import read_logs
 from analysis.summary.analyze import Request
@@ -53,12 +55,12 @@ def analysis_of(folder: Path, settings: ArchiveSettings) -> Request:
     )
 
 
-def preregistration_faults(folder: Path) -> list[str]:
+def preregistration_faults(folder: Path) -> list[ArchiveFault]:
     """What of an archive's preregistrations was edited or is missing, also what its journals name."""
     chain = preregistration.read_chain(folder / PREREGISTRATION)
     journals = sorted((folder / RESULTS).glob(f"sub-*/*{journal.ENDING}"))
     gone = preregistration.missing(chain, preregistration.carried_by(journals))
-    return [text.replace(f"{folder}/", "").partition("; ")[0] for text in (*chain.problems, *gone)]
+    return [ArchiveFault(file=os.path.relpath(one.at, folder), said=one.said) for one in (*chain.problems, *gone)]
 
 
 def bids_files(folder: Path, settings: ArchiveSettings) -> dict[str, bytes]:

@@ -52,7 +52,7 @@ def freeze(folder: Path, reason: str, clock: Clock) -> Frozen:
         check_reason(reason)
     planned, chain = _planned(study), read_chain(folder)
     if problems := [*chain.problems, *missing(chain, carried_by(journals(study.results)))]:
-        raise PreregistrationError("\n".join(problems))
+        raise PreregistrationError("\n".join(map(str, problems)))
     now = files_now(study.source, study.config, study.setups)
     since = () if chain.last is None else changes(chain.last.files, now)
     if chain.last is not None and not since:
@@ -113,7 +113,7 @@ def _write_new(path: Path, data: bytes) -> None:
     try:
         descriptor = storage.create(path)
     except OSError as error:
-        raise PreregistrationError(f"{path}: cannot be made ({error.strerror}); nothing was frozen") from error
+        raise PreregistrationError(f"cannot be made ({error.strerror}); nothing was frozen", at=path) from error
     try:
         with open(descriptor, "wb") as file:  # noqa: PTH123 - a descriptor has no path
             storage.write_all(file.fileno(), data)
@@ -121,7 +121,7 @@ def _write_new(path: Path, data: bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             path.unlink()
-        raise PreregistrationError(f"{path}: cannot be written ({error.strerror}); nothing was frozen") from error
+        raise PreregistrationError(f"cannot be written ({error.strerror}); nothing was frozen", at=path) from error
 
 
 def frozen_text(found: Frozen) -> str:

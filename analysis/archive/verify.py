@@ -17,7 +17,7 @@ from pathlib import Path
 
 from analysis.archive import making, manifest
 from analysis.archive.contents import CONTENTS
-from analysis.archive.making import ANALYSIS, BIDS, RESULTS, ArchiveSettings
+from analysis.archive.making import ANALYSIS, BIDS, PREREGISTRATION, RESULTS, ArchiveSettings
 from analysis.archive.manifest import ArchiveFault
 from analysis.logs.files import shown_name
 from analysis.logs.reading import Track
@@ -76,7 +76,8 @@ class Verified:
             return f"{shown}: whole ({self.files} files), and {made}\n{vouches}"
         if not self.rebuilt:
             return f"{shown}: {len(self.faults)} of its parts are not as they were archived"
-        files = [*dict.fromkeys(shown_name(fault.file) for fault in self.faults if fault.file)]
+        paths = dict.fromkeys(fault.file for fault in self.faults if not fault.file.startswith(PREREGISTRATION))
+        files = [*map(shown_name, paths)]
         one = "1 file is" if len(files) == 1 else f"{len(files)} files are"
         otherwise = f"{one} not what this Recoil makes of its journals: {first_few(files, _FILES)}; {self._made_by()}"
         but = otherwise if files else "its preregistrations are not all there as they were frozen"
@@ -110,7 +111,7 @@ def verify(folder: Path, track: Track = iter) -> Verified:
                 made = [*_made_again(folder, Path(place), hashes.listed, track)]
                 faults, remarks = _compared(folder, hashes.listed, made)
                 faults += [ArchiveFault(file=CONTENTS, said=said) for said in _contents_faults(folder)]
-                faults += [ArchiveFault(said=said) for said in making.preregistration_faults(folder)]
+                faults += making.preregistration_faults(folder)
                 rebuilt, recoil = len(made), _recoil_of(_versions(folder))
             except RecoilError as error:
                 said = str(error).replace(f"{place}{os.sep}", f"{folder}{os.sep}")

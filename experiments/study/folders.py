@@ -217,7 +217,7 @@ def freeze_status(folder: Path, carried: Sequence[tuple[str, str]] = ()) -> Free
         study = _loaded(str(folder / STUDY_FILE), folder / "results")
     except ConfigError as error:
         chain = read_chain(folder)
-        return FreezeStatus(chain=chain, missing=(*missing(chain, carried), *str(error).splitlines()))
+        return FreezeStatus(chain=chain, missing=(*map(str, missing(chain, carried)), *str(error).splitlines()))
     return status_beside(folder, lambda: files_now(study.source, study.config, study.setups), carried)
 
 

@@ -42,7 +42,11 @@ SHORT = 12
 
 
 class PreregistrationError(RecoilError):
-    """A preregistration that cannot be written, or trusted; the message says what to do."""
+    """A preregistration that cannot be written, or trusted: what is so `at` a file or folder, and what mends it."""
+
+    def __init__(self, said: str, *, at: Path | str = "", mend: str = "") -> None:
+        super().__init__("; ".join(filter(None, [f"{at}: {said}" if at else said, mend])))
+        self.said, self.at = said, at
 
 
 class Preregistration(Model):
@@ -191,7 +195,7 @@ class Chain:
 
     folder: Path
     every: tuple[Preregistration, ...] = ()
-    problems: tuple[str, ...] = ()
+    problems: tuple[PreregistrationError, ...] = ()
 
     @property
     def last(self) -> Preregistration | None:
@@ -221,7 +225,7 @@ def numbers_there(folder: Path) -> list[int]:
 
 def read_chain(folder: Path) -> Chain:
     """The preregistrations beside a study; none is no problem."""
-    every, problems, there = list[Preregistration](), list[str](), numbers_there(folder)
+    every, problems, there = list[Preregistration](), list[PreregistrationError](), numbers_there(folder)
     for number in sorted({*there, *(number - 1 for number in there if number > 1)}):
         try:
             one = _read(json_file(folder, number), number)
@@ -229,20 +233,23 @@ def read_chain(folder: Path) -> Chain:
             every.append(one)
             problems += _edited_page(page_file(folder, number), one)
         except PreregistrationError as error:
-            problems.append(str(error))
+            problems.append(error)
     return Chain(folder=folder, every=tuple(every), problems=tuple(problems))
 
 
-def _broken_links(folder: Path, before: Sequence[Preregistration], one: Preregistration) -> Iterator[str]:
+def _broken_links(
+    folder: Path, before: Sequence[Preregistration], one: Preregistration
+) -> Iterator[PreregistrationError]:
     earlier = before[-1] if before and before[-1].number == one.number - 1 else None
     if earlier is not None and one.previous != earlier.sha256:
-        yield (
-            f"{json_file(folder, earlier.number)}: is not the preregistration that {json_file(folder, one.number).name}"
-            f" amends ({str(one.previous)[:SHORT]}, not {earlier.short}); it was replaced: {_RESTORE}"
+        said = (
+            f"is not the preregistration that {json_file(folder, one.number).name} amends "
+            f"({str(one.previous)[:SHORT]}, not {earlier.short})"
         )
+        yield PreregistrationError(said, at=json_file(folder, earlier.number), mend=f"it was replaced: {_RESTORE}")
 
 
-def _edited_page(path: Path, one: Preregistration) -> Iterator[str]:
+def _edited_page(path: Path, one: Preregistration) -> Iterator[PreregistrationError]:
     """A page that is not there says nothing: the words stand in the other file too."""
     try:
         there = storage.read_whole(path).decode().replace("\r\n", "\n")
@@ -251,10 +258,8 @@ def _edited_page(path: Path, one: Preregistration) -> Iterator[str]:
     except (OSError, UnicodeDecodeError) as error:
         there = str(error)
     if there != one.page():
-        yield (
-            f"{path}: was edited: it is not the page of {json_file(path.parent, one.number).name}; delete it, and "
-            f"`recoil freeze {path.parent}` writes it again"
-        )
+        said = f"was edited: it is not the page of {json_file(path.parent, one.number).name}"
+        yield PreregistrationError(said, at=path, mend=f"delete it, and `recoil freeze {path.parent}` writes it again")
 
 
 def _read(path: Path, number: int) -> Preregistration:
@@ -268,21 +273,21 @@ def _read(path: Path, number: int) -> Preregistration:
         if STUDY_FILE in one.files:
             StudyConfig.model_validate_json(json.dumps(one.files[STUDY_FILE]), extra="ignore")
     except FileNotFoundError as error:
-        raise PreregistrationError(f"{path}: is missing, though its page or a later one is not; {_RESTORE}") from error
+        said = "is missing, though its page or a later one is not"
+        raise PreregistrationError(said, at=path, mend=_RESTORE) from error
     except OSError as error:
-        raise PreregistrationError(f"{path}: cannot be read ({error.strerror})") from error
+        raise PreregistrationError(f"cannot be read ({error.strerror})", at=path) from error
     except (ValueError, RecursionError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
-        raise PreregistrationError(
-            f"{path}: was edited, or is of another version of Recoil ({why}); {_RESTORE}"
-        ) from error
+        said = f"was edited, or is of another version of Recoil ({why})"
+        raise PreregistrationError(said, at=path, mend=_RESTORE) from error
     if one.sha256 == stated and one.number != number:
-        raise PreregistrationError(f"{path}: was renamed: it is preregistration {one.number}; give it its name back")
+        said = f"was renamed: it is preregistration {one.number}"
+        raise PreregistrationError(said, at=path, mend="give it its name back")
     if one.sha256 != stated or STUDY_FILE not in one.files:
-        raise PreregistrationError(
-            f"{path}: was edited: its content has the hash {one.short}, and it says {str(stated)[:SHORT]}; {_RESTORE}."
-            f" A change that is meant goes into the configs; `recoil freeze {path.parent}` then writes an amendment"
-        )
+        said = f"was edited: its content has the hash {one.short}, and it says {str(stated)[:SHORT]}"
+        meant = f"A change that is meant goes into the configs; `recoil freeze {path.parent}` then writes an amendment"
+        raise PreregistrationError(said, at=path, mend=f"{_RESTORE}. {meant}")
     return one
 
 
@@ -310,7 +315,7 @@ class FreezeStatus:
     @property
     def problems(self) -> tuple[str, ...]:
         """What was edited, or is missing."""
-        return (*self.chain.problems, *self.missing)
+        return (*map(str, self.chain.problems), *self.missing)
 
     def of_files(self, names: Collection[str]) -> FreezeStatus:
         """The same of some files alone."""
@@ -350,7 +355,7 @@ def study_folder(results: Path, source: Path) -> Path:
 def status_beside(folder: Path, now: Callable[[], Files], carried: Iterable[tuple[str, str]] = ()) -> FreezeStatus:
     """How a study stands. `now` reads its files, if something was frozen; `carried`: whose journal names which hash."""
     chain = read_chain(folder)
-    gone = tuple(missing(chain, carried))
+    gone = tuple(map(str, missing(chain, carried)))
     if chain.last is None:
         return FreezeStatus(chain=chain, missing=gone)
     try:
@@ -359,17 +364,19 @@ def status_beside(folder: Path, now: Callable[[], Files], carried: Iterable[tupl
         return FreezeStatus(chain=chain, missing=(*gone, *str(error).splitlines()))
 
 
-def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """A line for each preregistration that journals name, and that is not there. `carried`: code and hash."""
+def missing(chain: Chain, carried: Iterable[tuple[str, str]]) -> Iterator[PreregistrationError]:
+    """One for each preregistration that journals name, and that is not there. `carried`: code and hash."""
     whose: dict[str, dict[str, None]] = {}
     for code, named in carried:
         if named and chain.by_hash(named) is None:
             whose.setdefault(named, {})[code] = None
     for named, codes in whose.items():
-        yield (
-            f"{chain.folder}: there is no preregistration {named[:SHORT]} that can be trusted, which the journals of "
-            f"{', '.join(codes)} name; put its file preregistration-N.json back there, from a copy"
+        said = (
+            f"there is no preregistration {named[:SHORT]} that can be trusted, which the journals of "
+            f"{', '.join(codes)} name"
         )
+        mend = "put its file preregistration-N.json back there, from a copy"
+        yield PreregistrationError(said, at=chain.folder, mend=mend)
 
 
 def carried_by(paths: Iterable[Path]) -> Iterator[tuple[str, str]]:
@@ -395,8 +402,7 @@ def run_warnings(setup: Setup[DesignConfig], results: Path, journals: Iterable[P
     """What there is to say before a run of a frozen study: what was edited or is missing, and what has changed."""
     folder = study_folder(results, setup.source)
     chain = read_chain(folder)
-    yield from chain.problems
-    yield from missing(chain, carried_by(journals))
+    yield from map(str, (*chain.problems, *missing(chain, carried_by(journals))))
     if chain.last is not None and (found := changes_of_run(chain.last, setup.record())):
         yield (
             f"{setup.source}: is not as in {chain.last.title}; the run goes on, and the report will list what differs; "
