@@ -12,6 +12,7 @@ import pytest
 
 from experiments.config.setup import sha256
 from experiments.record.journal import JournalError
+from experiments.watch.feed import MarkerFeed
 from experiments.watch.folder import FolderWatch
 from experiments.watch.page import page_parts
 from tests.journals import forged, raw
@@ -138,7 +139,28 @@ def test_no_answer_is_shown_of_a_line_that_is_no_json(value: str, answered: list
     lines = forged(answered[: n + 1]).splitlines(keepends=True)
     lines[-1] = lines[-1].replace(json.dumps(WORDS, ensure_ascii=False).encode(), value.encode())
     check_blind(journal, b"".join(lines), value)
-    assert f"line {n + 1}: not a JSON record (…); it was changed or damaged" in page(journal, b"".join(lines))
+    expected = f"line {n + 1}: not a JSON record (…); it was changed or damaged"
+    assert expected in page(journal, b"".join(lines))
+    assert terminal(journal, b"".join(lines)) == f"{journal}: {expected}; no more markers of this run"
+
+
+def terminal(journal: Path, data: bytes) -> str:
+    """What is said on the terminal of the markers of a run."""
+    said = list[str]()
+    journal.unlink()
+    feed = MarkerFeed(journal.parent.parent, said.append)
+    journal.write_bytes(data)
+    feed.find()
+    feed.look()
+    return "\n".join(said)
+
+
+def test_no_answer_stands_on_the_terminal_of_the_markers(answered: list[Entry], journal: Path) -> None:
+    journal.touch()
+    for n in {kind_of(entry): n for n, entry in enumerate(answered)}.values():
+        for entry in [one for way in ways(answered[n].get("body", {})) for one in damaged(answered[n], ("body", *way))]:
+            said = terminal(journal, forged([*answered[:n], entry, *answered[n + 1 : n + 5]]))
+            assert not [one for one in TELLTALES if one in said], (n, said)
 
 
 def test_the_watch_shows_place_and_rule_without_the_value_and_of_other_errors_nothing() -> None:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from device.machine_clock import machine_s
 from experiments.record import storage
-from experiments.record.journal import Head, JournalError, Record
+from experiments.record.journal import Head, Record
 from experiments.record.tail import JournalTail
 from experiments.watch.folder import journals_in
 from experiments.watch.markers import Marker, RunMarkers
-from experiments.watch.runs import age_s
+from experiments.watch.runs import age_s, damage_shown
 
 _FIND_S = 0.2
 """How often it is looked for journals that have begun or go on."""
@@ -107,10 +107,8 @@ class FollowedRun:
             for record in self._tail.look().records:
                 markers += self._of(record)
                 self.over = record.kind == "finished"
-        except JournalError as error:
-            self._end(str(error))
         except Exception as error:  # noqa: BLE001 - whatever one journal does, the others go on
-            self._end(f"{self._path}: makes no run ({str(error) or type(error).__name__}); it was changed")
+            self._end(damage_shown(self._path, error))
         return markers
 
     def _end(self, why: str) -> None:

@@ -286,6 +286,13 @@ def _named(path: Path) -> tuple[str, str, bool]:
     return (name[1], name[2], name[3] is not None) if name else (path.name, "", False)
 
 
+def damage_shown(path: Path, error: Exception) -> str:
+    """What is wrong with a journal, for people who must see no answer: nothing of what stands in it."""
+    if isinstance(error, JournalError):
+        return error.shown or f"{path}: makes no run; it was changed"
+    return f"{path}: makes no run ({type(error).__name__}); it was changed"
+
+
 class WatchedRun:
     """A journal in the folder that is watched, and what is to be shown of its run. Never raises."""
 
@@ -312,10 +319,8 @@ class WatchedRun:
             return False
         try:
             return self._take_news()
-        except JournalError as error:
-            problem = error.shown or f"{self.path}: makes no run; it was changed"
         except Exception as error:  # noqa: BLE001 - whatever one journal does, the others are shown
-            problem = f"{self.path}: makes no run ({type(error).__name__}); it was changed"
+            problem = damage_shown(self.path, error)
         before, self._problem, self._row = self._problem, problem, None
         return problem != before
 
