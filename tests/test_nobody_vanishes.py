@@ -184,6 +184,27 @@ def test_a_finished_run_without_its_table_is_analysed_exported_and_named(recoil:
     assert "is missing, though the run is finished; `recoil rebuild" in study.stderr
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("named", ["grip", "preference"])
+@pytest.mark.parametrize("with_journal", [True, False])
+def test_a_log_that_is_named_for_another_experiment_is_told_and_makes_no_row(
+    named: str, with_journal: bool, quick_configs: Path, tmp_path: Path
+) -> None:
+    for code in ("P01", "P02", "P03"):
+        ran(tmp_path / "results", code, str(quick_configs / "direction.toml"))
+    for path in [*(tmp_path / "results" / "sub-P02").iterdir()]:
+        if with_journal or path.suffix == ".csv":
+            path.rename(path.with_name(path.name.replace("direction", named)))
+    statistics, exceptions, _ = analyze(Request(paths=[tmp_path / "results"], out=tmp_path / "out"))
+    (left_out,) = [one for one in exceptions if one.startswith("left out: ")]
+    assert f"sub-P02_task-{named}_trials.csv: " in left_out
+    assert "was it renamed? (rule: a " in left_out
+    assert f"- Left out: sub-P02/sub-P02_task-{named}_trials.csv: " in (tmp_path / "out" / "report.md").read_text()
+    found = statistics.participation
+    assert found is not None
+    assert {name: one.analysed for name, one in found.experiments.items()} == {"direction": 2 if with_journal else 3}
+
+
 def test_an_unfinished_synthetic_run_beside_people_is_kept_out_and_nobody_has_begun(tmp_path: Path) -> None:
     broken_off(tmp_path, "S01", 9)
     for code in ("P01", "P02"):

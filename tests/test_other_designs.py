@@ -196,14 +196,20 @@ def test_designs_of_two_names_that_are_alike_otherwise_stay_apart(study: Path) -
     assert told == {"magnitude": f"{title} (magnitude)", "again": f"{title} (again)"}
 
 
-def test_a_log_that_is_named_for_another_experiment_is_named(study: Path) -> None:
+@pytest.mark.parametrize("ending", ["", ".csv", "_journal.jsonl"])
+def test_a_log_that_is_named_for_another_experiment_is_left_out_and_that_is_none(ending: str, study: Path) -> None:
     do(study, "P01")
-    for path in [*(study / "results" / "sub-P01").iterdir()]:
+    do(study, "P02")
+    renamed = [path for path in (study / "results" / "sub-P01").iterdir() if path.name.endswith(ending)]
+    for path in renamed:
         path.rename(path.with_name(path.name.replace("magnitude", "loudness")))
     logs = read_logs([study / "results"])
-    assert [one.design.design for one in logs.designs] == ["magnitude"]
-    said = "analysed as 'magnitude', of which its journal is, though it is named for 'loudness'"
-    assert said in [one.message for one in logs.remarks]
+    (problem,) = [one for one in logs.problems if "was it renamed?" in one.message]
+    assert (problem.participant, problem.experiment) == ("P01", "magnitude")
+    assert "loudness" in problem.file.name
+    assert ("is a table of 'magnitude', named for 'loudness'" in problem.message) is (ending == ".csv")
+    assert [*participation(logs, {"magnitude": ["P02"]}, left_out_by_files(logs)).experiments] == ["magnitude"]
+    assert ("P01" in logs.designs[0].table["participant_id"].to_numpy()) is (ending == ".csv")  # its journal makes it
 
 
 def test_a_synthetic_run_that_gave_way_is_none_of_the_peoples_that_were_set_aside(study: Path, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from analysis.logs.files import (
     FULL_ONSET,
     BadLogError,
     Problem,
+    check_name,
     code_in_name,
     experiment_in_name,
     results_above,
@@ -128,6 +129,8 @@ class LogsSoFar:
             try:
                 if isinstance(log, BadLogError):
                     raise log
+                if number in batch.journals:
+                    check_name(one.path, log.experiment)
                 self.doubt(one, log, batch.doubts.get(number, ""), proven=batch.journals.get(number) is not None)
                 self.admit(number, one, log, study)
             except BadLogError as bad:
@@ -154,12 +157,6 @@ class LogsSoFar:
                 self.originals[number] = beside.original
             if beside.said:
                 self.remarks.append(BadLogError(beside.said).of(one.file, log.code, log.experiment, one.study))
-
-    def note_name(self, one: WaitingFile, log: Log) -> None:
-        """A file that is named for another experiment than it is of."""
-        if (named := experiment_in_name(one.path)) != log.experiment:
-            said = f"analysed as {log.experiment!r}, of which its journal is, though it is named for {named!r}"
-            self.remarks.append(BadLogError(said).of(one.file, log.code, log.experiment, one.study))
 
     def changed_setups(self) -> list[Problem]:
         """Which logs that count together were made with several setups, and what differs."""

@@ -12,8 +12,8 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.logs.cell_rules import FEWEST_ALIKE, all_alike, as_moment, cell_fault, cell_value, no_date, too_early
-from analysis.logs.files import BadLogError, check_length, code_in_name, experiment_in_name
-from analysis.logs.journals import Beside, journal_beside, journal_of
+from analysis.logs.files import BadLogError, check_length, check_name, code_in_name, experiment_in_name
+from analysis.logs.journals import Beside, check_journals_name, journal_beside, journal_of
 from analysis.logs.names import gun_labels
 from device.messages import first_few
 from experiments.config.door import ConfigError, checked_table
@@ -65,7 +65,7 @@ def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
     if isinstance(content, BadLogError):
         raise content
     check_length(content)
-    data, design, head = _design_of(path)
+    data, design, head = _design_of(path, content)
     rows = tuple(_rows(content, design))
     code = _code(path, rows)
     _check_plan(design, head.plan, rows)
@@ -82,19 +82,29 @@ def read_design_log(path: str, content: bytes | BadLogError) -> DesignLog:
     )
 
 
-def _design_of(path: str) -> tuple[bytes, DesignConfig, Head]:
+def _design_of(path: str, content: bytes) -> tuple[bytes, DesignConfig, Head]:
     """The bytes of the journal beside a log, the design in its first line, and that line."""
     beside = Path(journal_of(path))
     if not beside.is_file():
+        check_name(path, _experiment_in(content) or experiment_in_name(path))
         raise BadLogError(f"there is no {beside.name} beside it, which says what the columns mean; keep both together")
     try:
         data = journal.journal_bytes(beside)
         head = journal.head_of(beside, data)
         if head is None:
             raise BadLogError(f"{beside.name} has no whole first line, so nothing says what the columns mean")
+        check_journals_name(str(beside), head.plan, "its journal ")
         return data, began_with(head), head
     except JournalError as error:
         raise BadLogError(str(error)) from error
+
+
+def _experiment_in(content: bytes) -> str:
+    """Of which experiment the rows of a table say that it is; empty if they do not say one."""
+    with suppress(UnicodeDecodeError, csv.Error):
+        named = {row.get("experiment") or "" for row in csv.DictReader(content.decode("utf-8-sig").splitlines())}
+        return next(iter(named)) if len(named) == 1 else ""
+    return ""
 
 
 _TOGETHER = ("design", "factors", "order", "procedure", "trial", "questions", "table")

@@ -21,21 +21,26 @@ FULL_ONSET = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z")
 
 
 class BadLogError(RecoilError):
-    """A log that breaks a rule: what, and where. It never leaves the room."""
+    """A log that breaks a rule: what, and where. It never leaves the room.
 
-    def __init__(self, message: str, line: int | None = None, column: str | None = None) -> None:
+    `experiment`: of which it is, where its name says another.
+    """
+
+    def __init__(
+        self, message: str, line: int | None = None, column: str | None = None, *, experiment: str = ""
+    ) -> None:
         super().__init__(message)
-        self.message, self.line, self.column = str(self), line, column
+        self.message, self.line, self.column, self.experiment = str(self), line, column, experiment
 
     def of(self, file: Path, participant: str, experiment: str, study: str) -> Problem:
-        """The same as it leaves the room: in which file, whose log it was, of which experiment."""
+        """The same as it leaves the room: in which file, whose log it was, of which experiment by its name."""
         return Problem(
             file=file,
             line=self.line,
             column=self.column,
             message=self.message,
             participant=participant,
-            experiment=experiment,
+            experiment=self.experiment or experiment,
             study=study,
         )
 
@@ -298,6 +303,18 @@ def experiment_in_name(path: str) -> str:
     """
     found = _TASK.search(path)
     return found[1] if found else ""
+
+
+def check_name(path: str, experiment: str) -> None:
+    """`BadLogError` for a table of an experiment that is named for another."""
+    named = experiment_in_name(path)
+    if named not in ("", experiment):
+        own = _name(path).replace(f"_task-{named}_", f"_task-{experiment}_")
+        raise BadLogError(
+            f"is a table of {experiment!r}, named for {named!r}; was it renamed? (rule: a table is called as its run, "
+            f"{own}); give it its name back, and its journal too",
+            experiment=experiment,
+        )
 
 
 LONGEST_LOG, LONGEST_MAPPED = 100_000, 400_000

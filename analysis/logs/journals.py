@@ -13,8 +13,9 @@ from typing import Literal, NamedTuple
 
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.messages import first_few, how_many
+from experiments.design.plan import Plan
 from experiments.record import journal, replay, storage
-from experiments.record.journal import Contents, JournalError
+from experiments.record.journal import JournalError
 from experiments.record.lines import ending_of
 from experiments.record.names import JOURNAL_NAME, misnamed
 from experiments.record.rebuild import began_with, rows_beyond, table
@@ -108,7 +109,7 @@ def made_again(run: RunFile) -> bytes | BegunRun:
         contents = journal.begun(Path(run.path))
         if contents is None:
             return BegunRun(file=run, answered=0, planned=0)
-        _refuse_other(run, contents)
+        check_journals_name(run.path, contents.plan)
         if not contents.finished:
             done = len(answered(replay.history(contents), began_with(contents.head).judgements))
             return BegunRun(file=run, answered=done, planned=len(contents.plan.trials), data=data_of(contents.head))
@@ -117,9 +118,10 @@ def made_again(run: RunFile) -> bytes | BegunRun:
         raise BadLogError(f"its table is missing, and the journal is no help: {_without(run.path, error)}") from error
 
 
-def _refuse_other(run: RunFile, contents: Contents) -> None:
-    if said := misnamed(Path(run.path), contents.plan):
-        raise JournalError(said)
+def check_journals_name(path: str, plan: Plan, called: str = "") -> None:
+    """`BadLogError` for a journal that lies under another run's name; `called`: as what its table knows it."""
+    if said := misnamed(Path(path), plan):
+        raise BadLogError(f"{called}{said}", experiment=plan.experiment)
 
 
 class Beside(NamedTuple):

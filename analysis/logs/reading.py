@@ -46,6 +46,7 @@ from analysis.logs.journals import (
     all_gone,
     compared,
     gone,
+    journal_of,
     made_again,
     run_file,
     without_table,
@@ -154,6 +155,7 @@ def read_logs(
     for waiting, batch in _checked_batches(_batches(found, track, made), mapping):
         reading.add(waiting, batch)
     designs = _designed(reading, {path: every[path] for path in every if path not in found}, track, len(found), made)
+    runs = [*_by_own_experiment(runs, reading.problems)]
     reading.leave_copies(runs)
     reading.remarks += gone(reading.proven.values())
     kinds = kinds_there(reading.kinds[number] for number in reading.studies)
@@ -225,6 +227,12 @@ def _without_tables(reading: LogsSoFar, runs: Sequence[RunFile]) -> tuple[dict[s
     return made, begun
 
 
+def _by_own_experiment(runs: Iterable[RunFile], problems: Iterable[Problem]) -> Iterator[RunFile]:
+    """The runs, each of the experiment that it is of, also where its files are named for another."""
+    told = {journal_of(str(one.file)): one.experiment for one in problems if one.experiment}
+    return (replace(run, experiment=told.get(run.path, run.experiment)) for run in runs)
+
+
 def _designed(
     reading: LogsSoFar, found: Mapping[str, str], track: Track, first: int, made: Mapping[str, bytes]
 ) -> dict[int, DesignLog]:
@@ -240,7 +248,6 @@ def _designed(
             reading.admit(number * LOGS_A_FILE, waiting, of_design, study)
             reading.note(number * LOGS_A_FILE, waiting, of_design, log.journal)
             reading.doubt(waiting, of_design, doubt_of_design(log.design, log.rows), proven=True)
-            reading.note_name(waiting, of_design)
             logs[number * LOGS_A_FILE] = log
             if told := told_by_design(number * LOGS_A_FILE, log.design, log.rows):
                 reading.told.setdefault(log.design.design, []).append(told)
