@@ -93,11 +93,11 @@ def test_the_figure_of_a_shot_names_every_option_also_those_that_are_assumed(tmp
 
 
 def test_a_dot_in_a_figures_name_that_begins_no_ending_stays(recoil, tmp_path):
-    for name in ("run_1.12", "run_1.14.SVG", "plain.pdf", "shot.v2"):
+    for name in ("run_1.12", "run_1.14.SVG", "plain.pdf", "shot.v2", "pulse_0.5ms"):
         said = recoil("simulate", "--plot", tmp_path / name).stderr
         assert f"Figure: {tmp_path}/{name.removesuffix('.SVG').removesuffix('.pdf')}.png" in said
     drawn = [path for path in tmp_path.glob("*.*") if path.suffix in (".png", ".svg", ".pdf")]
-    assert {path.stem for path in drawn} == {"plain", "run_1.12", "run_1.14", "shot.v2"}
+    assert {path.stem for path in drawn} == {"plain", "run_1.12", "run_1.14", "shot.v2", "pulse_0.5ms"}
 
 
 @pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
@@ -155,7 +155,7 @@ def test_a_trace_takes_the_place_of_a_file_alone(recoil, tmp_path):
     assert (tmp_path / "pipe").is_fifo()
 
 
-@pytest.mark.parametrize("ending", [".gif", ".CSV", ".json"])
+@pytest.mark.parametrize("ending", [".gif", ".CSV", ".json", ".mp4", ".JP2", ".h5", ".m4v"])
 def test_a_figure_of_another_kind_is_refused_with_those_there_are(recoil, tmp_path, ending):
     done = recoil("simulate", "--plot", tmp_path / f"shot{ending}", "--trace", tmp_path / "shot-trace.csv")
     said = f"--plot {tmp_path}/shot{ending}: figures are PNG, SVG and PDF; name one of these, as in shot.png"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,8 @@ from pathlib import Path
 from experiments.config.door import ConfigError
 
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
+_ENDING = re.compile(r"\.(?!v[0-9]+$)[a-z][a-z0-9]*")
+"""How the kind of a file is named: .gif, .mp4; a number or a version, as .12, .5ms or .v2, belongs to a name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +47,7 @@ class SimulateRequest:
 
     @property
     def plot_stem(self) -> Path | None:
-        """Where the figure goes, without its ending; what follows a dot with a digit in it, as `.v2`, is of the name.
+        """Where the figure goes, without its ending; a number or a version behind a dot is of the name.
 
         `ConfigError`: a folder is there, there is no name, or an ending of something else.
         """
@@ -53,7 +56,7 @@ class SimulateRequest:
         if self.plot.is_dir():
             raise ConfigError(f"--plot {self.plot}: is a folder; name a file")
         ending = self.plot.suffix.lower()
-        if ending[1:].isalpha() and ending not in FIGURE_ENDINGS:
+        if _ENDING.fullmatch(ending) and ending not in FIGURE_ENDINGS:
             raise ConfigError(f"--plot {self.plot}: figures are PNG, SVG and PDF; name one of these, as in shot.png")
         if self.plot.name.lower() in ("", "..", *FIGURE_ENDINGS):
             raise ConfigError(f"--plot {self.plot}: has no name but its ending; name a file, as in shot.png")
