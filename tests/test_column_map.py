@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -254,9 +255,43 @@ def test_a_code_that_is_none_is_refused_with_both_remedies_and_both_help(
     assert f"{code!r} is not a code" in str(problem)
     assert f"[participant] pattern = '{pattern}'" in str(problem)
     listed = f'{code!r} = "{own}"'
-    assert f"[values.participant] {listed} gives another one, to each person one of their own" in str(problem)
+    assert f"[values.participant] {listed} gives {code!r} a code of their own" in str(problem)
     for text in (_by_pattern(pattern), _by_pattern(r"^(\w+)$", "[values.participant]", listed)):
         assert _read(path, text).problems == ()
+
+
+CODES = ("A-1", "A_1", "a1", "张伟", "李娜", "Jürgen", "Jrgen", "Ж" * 40, "P" * 40, "P" * 41)
+
+
+def test_no_two_people_become_one_by_the_codes_that_are_proposed(tmp_path: Path) -> None:
+    rows = {code: _psychopy(trial_rows(code, seed)) for seed, code in enumerate(CODES)}
+    proposed = dict[str, str]()
+    alone = [_read(_write(tmp_path / f"{n}.csv", some)) for n, some in enumerate(rows.values())]  # a file each
+    for logs in (_read(_write(tmp_path / "all.csv", [row for some in rows.values() for row in some])), *alone[3:]):
+        for problem in logs.problems:
+            (key, own), *others = re.findall(r"\[values\.participant\] '(.*)' = \"([A-Za-z0-9]{1,32})\"", str(problem))
+            assert not others
+            assert str(problem).endswith(f"gives '{key}' a code of their own")
+            assert f"participant {key} of" in str(problem)
+            assert proposed.setdefault(key, own) == own
+    listed = [f'{key!r} = "{own}"' for key, own in proposed.items()]
+    logs = _read(
+        tmp_path / "all.csv", "\n".join([EXAMPLE.read_text(encoding="utf-8"), "[values.participant]", *listed])
+    )
+    assert logs.problems == ()
+    assert logs.trials["participant_id"].nunique() == len(CODES)
+
+
+def test_a_code_without_a_letter_or_digit_has_no_part_that_could_be_one(tmp_path: Path) -> None:
+    (problem,) = _read(_write(tmp_path / "all.csv", _psychopy(trial_rows("张伟")))).problems
+    assert "[participant] pattern" not in str(problem)
+
+
+def test_two_people_who_are_given_one_code_are_refused(tmp_path: Path) -> None:
+    path = _write(tmp_path / "all.csv", [row for code in ("张伟", "李娜") for row in _psychopy(trial_rows(code))])
+    both = ["[values.participant]", '"张伟" = "P01"', '"李娜" = "P01"']
+    (problem,) = _read(path, "\n".join([EXAMPLE.read_text(encoding="utf-8"), *both])).problems
+    assert "'张伟' and '李娜' are both code 'P01' by [values.participant] (rule: one code a participant" in str(problem)
 
 
 FAULTS: dict[str, tuple[Callable[[str], str], str]] = {

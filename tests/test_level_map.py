@@ -202,3 +202,19 @@ def test_a_map_that_is_none_is_refused(lab: Path, old: str, new: str, words: str
 
 def test_the_shipped_example_is_a_map() -> None:
     assert load(LevelMap, shipped_folder() / "examples" / "levels.toml").values.success == {"hit": True, "miss": False}
+
+
+@pytest.mark.parametrize(
+    ("codes", "by"),
+    [
+        ("pattern = '([0-9]+)'", "participant.pattern = '([0-9]+)'"),
+        ("[values.participant]\nVP_01 = 'P01'\nXY_01 = 'P01'", "[values.participant]"),
+    ],
+)
+def test_two_people_of_a_file_who_come_to_one_code_are_refused(lab: Path, codes: str, by: str) -> None:
+    (lab / "lab.csv").write_text("VP;Reiz;Treffer;Hand\nVP_01;6,5;ja;links\nXY_01;6,5;ja;links\n")
+    text, pattern = (lab / "map.toml").read_text(), "pattern = 'VP_(\\d+)'\n"
+    kept = text.replace(pattern, f"{codes}\n" if codes.startswith("pattern") else "")
+    (lab / "map.toml").write_text(kept if codes.startswith("pattern") else f"{kept}{codes}\n")
+    (problem,) = read_levels([lab / "lab.csv"], load(LevelMap, lab / "map.toml")).problems
+    assert f"'VP_01' and 'XY_01' are both code '{'01' if 'pattern' in by else 'P01'}' by {by}" in str(problem)

@@ -21,7 +21,7 @@ So the same rules check them. `configs/examples/columns.toml` shows every key. W
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
@@ -29,7 +29,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_LOG, BadLogError
-from analysis.logs.mapped_people import ShortText, check_person, code_in
+from analysis.logs.mapped_people import ShortText, alike, check_person, code_in
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
@@ -196,12 +196,13 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
             nobodys.append(bad)
     if not people:
         raise nobodys[0]
+    same = alike(code for _, code in people)
     found = [
         MappedLog(
             study=study,
             participant=code,
             experiment=mapping.experiment,
-            records=_records_or_fault(code, group, mapping),
+            records=_records_or_fault(code, group, mapping, same),
         )
         for (study, code), group in people.items()
     ]
@@ -235,20 +236,23 @@ def is_recoils(content: bytes) -> bool:
 
 
 def _records_or_fault(
-    code: str, lines: Sequence[SeparatedLine], mapping: ColumnMap
+    code: str, lines: Sequence[SeparatedLine], mapping: ColumnMap, same: Collection[str]
 ) -> tuple[CsvRecord, ...] | BadLogError:
     try:
-        return _records(code, lines, mapping)
+        return _records(code, lines, mapping, same)
     except BadLogError as bad:
         return bad
 
 
-def _records(code: str, lines: Sequence[SeparatedLine], mapping: ColumnMap) -> tuple[CsvRecord, ...]:
+def _records(
+    code: str, lines: Sequence[SeparatedLine], mapping: ColumnMap, same: Collection[str]
+) -> tuple[CsvRecord, ...]:
     """A participant's rows with the columns of Recoil's own table."""
     if len(lines) > LONGEST_LOG:
         raise BadLogError(f"participant {code} has {len(lines):,} rows (rule: at most {LONGEST_LOG:,})")
     column = mapping.participant.column
-    check_person(code, mapping.participant, lines[0].number, [line.cells[column] for line in lines] if column else ())
+    cells = [line.cells[column] for line in lines] if column else ()
+    check_person(code, mapping.participant, lines[0].number, cells, same)
     make = _rating if tables.is_rated(mapping.experiment) else _trial
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
     if tables.is_rated(mapping.experiment) and mapping.columns.trial is None:

@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
-from analysis.logs.mapped_people import ShortText, check_person, code_in
+from analysis.logs.mapped_people import ShortText, alike, check_person, code_in
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from device.messages import first_few
 from experiments.config.door import Model
@@ -93,10 +93,13 @@ def read_levels(paths: Sequence[Path], mapping: LevelMap) -> MappedLevels:
 
 def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap) -> list[_Row]:
     """Rows with an answer; whoever did not answer tells nothing. `BadLogError`: what is wrong, and with which rows."""
-    rows, faults = list[_Row | None](), list[BadLogError]()
+    rows, faults, column = list[_Row | None](), list[BadLogError](), mapping.participant.column
+    people, same = dict[str, str](), alike(line.cells[column] for line in lines) if column else ()
     for line in lines:
         try:
-            rows.append(_row(line, file_name, mapping))
+            code, text = _whose(line, file_name, mapping)
+            check_person(code, mapping.participant, line.number, (people.setdefault(code, text), text), same)
+            rows.append(_row(code, line, mapping))
         except BadLogError as bad:
             faults.append(bad)
     if faults:
@@ -110,12 +113,16 @@ _SHOWN = 5
 """So many lines are named in a message."""
 
 
-def _row(line: SeparatedLine, file_name: str, mapping: LevelMap) -> _Row | None:
-    """A row with an answer; `None` without one."""
-    where, columns = mapping.participant, mapping.columns
+def _whose(line: SeparatedLine, file_name: str, mapping: LevelMap) -> tuple[str, str]:
+    """The participant of a row, and the text that says so."""
+    where = mapping.participant
     text = file_name if where.column is None else line.cells[where.column]
-    code = code_in(text, where, mapping.values.participant, line.number)
-    check_person(code, where, line.number, ())
+    return code_in(text, where, mapping.values.participant, line.number), text
+
+
+def _row(code: str, line: SeparatedLine, mapping: LevelMap) -> _Row | None:
+    """A row with an answer; `None` without one."""
+    columns = mapping.columns
     success = _success(line, columns.success, mapping.values.success)
     if success is None:
         return None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Annotated, Self
 
@@ -67,24 +69,61 @@ def _group(pattern: str, text: str) -> str | None:
     return group_in(text, pattern) or None
 
 
-def check_person(code: str, where: ParticipantMapping, line: int, cells: Sequence[str]) -> None:
-    """`BadLogError` if a code is none, or if a pattern made it of several people's `cells`; `line` is their first."""
+def check_person(
+    code: str, where: ParticipantMapping, line: int, cells: Sequence[str], alike: Collection[str] = ()
+) -> None:
+    """`BadLogError` if a code is none, or if the map made it of several people's `cells`; `line` is their first.
+
+    `alike`: the letters and digits that several codes of the file come to.
+    """
     if not is_code(code):
         rule = "(rule: 1 to 32 letters or digits, A-Z, a-z, 0-9)"
-        raise BadLogError(f"{code!r} is not a code {rule}; {_remedy(code, where)}", line, where.column)
-    several = list(dict.fromkeys(cells)) if where.pattern is not None else []
+        raise BadLogError(f"{code!r} is not a code {rule}; {_remedy(code, where, alike)}", line, where.column)
+    several = list(dict.fromkeys(cells))
     if len(several) > 1:
-        both = f"{several[0]!r} and {several[1]!r} are both code {code!r} by participant.pattern = {where.pattern!r}"
-        raise BadLogError(f"{both} (rule: one code a participant)", line, where.column)
+        by = f"participant.pattern = {where.pattern!r}" if where.pattern else "[values.participant]"
+        both = f"{several[0]!r} and {several[1]!r} are both code {code!r} by {by}"
+        rule = "(rule: one code a participant; who has two names in the file is to have one there)"
+        raise BadLogError(f"{both} {rule}", line, where.column)
 
 
-def _remedy(code: str, where: ParticipantMapping) -> str:
+def alike(codes: Iterable[str]) -> frozenset[str]:
+    """What several of a file's codes come to once they have letters and digits alone, in small letters.
+
+    >>> sorted(alike(["A-1", "A_1", "B_1", "a1"]))
+    ['a1']
+    """
+    counts = Counter(_plain(code).casefold() for code in {*codes})
+    return frozenset(plain for plain, count in counts.items() if count > 1)
+
+
+def _plain(code: str) -> str:
+    return re.sub("[^A-Za-z0-9]", "", code)
+
+
+def _own_code(code: str, alike: Collection[str]) -> str:
+    """A code for a person whose own is none, which nobody else of the file has; what letters it lacks its hash tells.
+
+    >>> _own_code("VP_02", ()), _own_code("VP_02", ["vp02"]), _own_code("李娜", ())
+    ('VP02', 'VP02x2d8572', 'Px6e9c21')
+    """
+    plain = _plain(code)
+    if code.isascii() and is_code(plain) and plain.casefold() not in alike:
+        return plain
+    return f"{plain[:_KEPT] or 'P'}x{hashlib.sha256(code.encode()).hexdigest()[:6]}"
+
+
+_KEPT = 20
+
+
+def _remedy(code: str, where: ParticipantMapping, alike: Collection[str]) -> str:
     """How a map makes a code of a text that is none."""
-    own = re.sub("[^A-Za-z0-9]", "", code)[:32] or "P01"
-    listed = f'[values.participant] {code!r} = "{own}" gives another one, to each person one of their own'
+    listed = f'[values.participant] {code!r} = "{_own_code(code, alike)}" gives {code!r} a code of their own'
     if where.file_name or where.pattern:
         return f"let the pattern's group hold letters and digits alone, or {listed}"
     parts = re.search(r"^(.*?)([0-9]+|[A-Za-z0-9]+)$", code)
-    start, kind = (parts[1], r"\d" if parts[2].isdecimal() else "[A-Za-z0-9]") if parts else ("", "[A-Za-z0-9]")
-    pattern = f"[participant] pattern = '{re.escape(start)}({kind}+)'"
-    return f"{pattern} takes a part of it for the code, {listed}"
+    if parts is None:
+        return listed
+    kind = r"\d" if parts[2].isdecimal() else "[A-Za-z0-9]"
+    pattern = f"[participant] pattern = '{re.escape(parts[1])}({kind}+)'"
+    return f"{pattern} takes a part of it for the code, or {listed}"
