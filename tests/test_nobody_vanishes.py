@@ -65,16 +65,36 @@ def test_a_gun_that_was_changed_within_a_study_is_told_on_top_and_beside_the_num
     ran(tmp_path / "results", "P04", str(config))
     (told,) = (one for one in read_logs([tmp_path / "results"]).remarks if "setups" in one.message)
     assert (
-        f"4 runs of {experiment} were made with 2 setups (config and gun) and count together: P01, P02, P03 with one, "
+        f"4 runs of {experiment} were made with 2 setups {WHAT} and count together: P01, P02, P03 with one, "
         "P04 with gun voice_coil.voltage_V = 12.0, not 16.0;" in told.message
     )
     done = recoil("analyze", "results", "--out", "out")
     assert (done.returncode, "were made with 2 setups" in done.stderr) == (1, True)
     page = (tmp_path / "out" / "report.md").read_text()
-    said = f"4 runs of {experiment} were made with 2 setups (config and gun) and count together: P01, P02, P03 with one"
+    said = f"4 runs of {experiment} were made with 2 setups {WHAT} and count together: P01, P02, P03 with one"
     results, section, paper = "\n## Results\n", f"\n## {heading}\n", "\n## For your paper\n"
     for part in (results, section, paper):
         assert said in page.partition(part)[2].partition("\n## ")[0], part
+
+
+WHAT = "(config, gun and synthetic participants)"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("experiment", ["direction", "realism"])
+def test_runs_of_other_synthetic_participants_are_made_with_another_setup(
+    experiment: str, quick_configs: Path, tmp_path: Path
+) -> None:
+    config, laws = quick_configs / f"{experiment}.toml", quick_configs / "synthetic" / f"{experiment}.toml"
+    for code in ("P01", "P02"):
+        ran(tmp_path / "results", code, str(config))
+    laws.write_text(f"exposure_s = 4.25\n{laws.read_text()}")
+    ran(tmp_path / "results", "P03", str(config))
+    (told,) = (one for one in read_logs([tmp_path / "results"]).remarks if "setups" in one.message)
+    assert told.message.startswith(
+        f"3 runs of {experiment} were made with 2 setups {WHAT} and count together: P01, P02 with one, P03 with "
+        "synthetic exposure_s = 4.25, not 5.0; "
+    )
 
 
 def test_of_very_many_setups_a_few_are_told_and_where_the_others_are() -> None:

@@ -196,6 +196,16 @@ def test_designs_of_two_names_that_are_alike_otherwise_stay_apart(study: Path) -
     assert told == {"magnitude": f"{title} (magnitude)", "again": f"{title} (again)"}
 
 
+@pytest.mark.parametrize("person", [True, False])
+def test_how_synthetic_people_answer_is_of_the_setup_of_their_runs_alone(person: bool, study: Path) -> None:
+    do(study, "P01", "P02", person=person)
+    laws = study / "synthetic" / "magnitude.toml"
+    laws.write_text(f"exposure_s = 4.25\n{laws.read_text()}")
+    do(study, "P03", person=person)
+    told = [one.message for one in read_logs([study / "results"]).remarks if "setups" in one.message]
+    assert ["P03 with synthetic exposure_s = 4.25, not 5.0" in one for one in told] == [True] * (not person)
+
+
 @pytest.mark.parametrize("ending", ["", ".csv", "_journal.jsonl"])
 def test_a_log_that_is_named_for_another_experiment_is_left_out_and_that_is_none(ending: str, study: Path) -> None:
     do(study, "P01")

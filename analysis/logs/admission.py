@@ -152,7 +152,8 @@ class LogsSoFar:
         """The journal of a log that was admitted: whether there is one, its setup, and what there is to say of it."""
         self.proven[number] = one.study, log.code, beside is not None
         if beside is not None:
-            self.setups[number] = beside.setup
+            is_synthetic = self.kinds.get(number) == "synthetic"
+            self.setups[number] = f"{beside.setup}{beside.laws if is_synthetic else ''}"
             if beside.original:
                 self.originals[number] = beside.original
             if beside.said:

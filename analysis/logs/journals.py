@@ -127,12 +127,14 @@ def check_journals_name(path: str, plan: Plan, called: str = "") -> None:
 class Beside(NamedTuple):
     """The journal beside a table: what there is to say of it, empty if all is well, and the hash of its setup.
 
-    `original`: of a redacted one the SHA-256 of the first line of the journal that it was made from.
+    `original`: of a redacted one the SHA-256 of the first line of the journal that it was made from. `laws`: the hash
+    of how synthetic people answer.
     """
 
     said: str
     setup: str = ""
     original: str = ""
+    laws: str = ""
 
 
 def compared(path: str, content: bytes) -> Beside | None:
@@ -150,17 +152,21 @@ def compared(path: str, content: bytes) -> Beside | None:
 def journal_beside(data: bytes, path: str, content: bytes) -> Beside:
     """The journal of a table, by its bytes. Raises as `compared`."""
     said = compared_with(data, path, content)
-    return Beside(said, setup=_in_head(_SETUP, data), original=_in_head(_ORIGINAL, data))
+    laws = hashlib.sha256(_in_head(_LAWS, data)).hexdigest()
+    return Beside(said, _in_head(_SETUP, data).decode(), _in_head(_ORIGINAL, data).decode(), laws)
 
 
 _SETUP = re.compile(rb'"setup_sha256":"([0-9a-f]{64})"')
 _ORIGINAL = re.compile(rb'"redacted_from":\{"format":1,"first_line_sha256":"([0-9a-f]{64})"')
 
 
-def _in_head(hash_there: re.Pattern[bytes], data: bytes) -> str:
-    """A hash in the first line of a journal; empty if there is none."""
-    found = hash_there.search(data, 0, data.find(b"\n"))
-    return found[1].decode() if found else ""
+_LAWS = re.compile(rb'"laws":(\{.*?),"setup":\{')
+
+
+def _in_head(there: re.Pattern[bytes], data: bytes) -> bytes:
+    """What the group of a pattern finds in the first line of a journal; empty if that is nothing."""
+    found = there.search(data, 0, data.find(b"\n"))
+    return found[1] if found else b""
 
 
 def begins_with(path: str, line_sha256: str) -> bool:

@@ -32,7 +32,7 @@ class PooledSetups(Problem):
 class SetupOfLog:
     """With which setup a log was made: the study's folder, experiment, code, the log's path, and the setup's hash.
 
-    Logs of another `kind` of data do not count together.
+    Logs of another `kind` of data do not count together. How synthetic participants answer is of their setup, too.
     """
 
     study: str
@@ -73,8 +73,9 @@ def _told(setups: Mapping[str, list[SetupOfLog]]) -> Problem:
     if len(others) > _SETUPS:
         more, rest = how_many(sum(map(len, others[_SETUPS:])), "run"), len(others) - _SETUPS
         differing += f"; and {more} with {rest} other setups, which the first line of each journal holds"
+    what = "config, gun and synthetic participants" if one.kind == "synthetic" else "config and gun"
     said = (
-        f"{how_many(count, 'run')} of {one.experiment} were made with {len(setups)} setups (config and gun) and count "
+        f"{how_many(count, 'run')} of {one.experiment} were made with {len(setups)} setups ({what}) and count "
         f"together: {_people(first, most)} with one, {differing}"
     )
     message = f"{said}; if that matters, analyse them apart: name their folders in a call of its own"
@@ -109,4 +110,7 @@ def setup_differences(before: Files, after: Files, most: int = _NAMED) -> str:
 
 def _setup(log: SetupOfLog) -> Files:
     head = journal.head(Path(journal_of(log.path)))
-    return head.setup_json if head is not None and isinstance(head.setup_json, dict) else {}
+    if head is None or not isinstance(head.setup_json, dict):
+        return {}
+    laws = head.laws_json if log.kind == "synthetic" and isinstance(head.laws_json, dict) else {}
+    return {**head.setup_json, "synthetic": laws}

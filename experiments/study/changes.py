@@ -26,8 +26,8 @@ _TOLD = 5
 FileValues = Mapping[str, JsonValue]
 Files = Mapping[str, FileValues]
 """The files of a study, by their place beside `study.toml`, as plain values."""
-_OF_SETUP: dict[str, type[Model]] = {"experiment": DesignConfig, "gun": GunConfig}
-"""The parts of a setup, as the head of a journal names them."""
+_OF_SETUP: dict[str, type[Model]] = {"experiment": DesignConfig, "gun": GunConfig, "synthetic": SyntheticAnswers}
+"""The parts of a setup, as the head of a journal names them; the last where synthetic people are compared."""
 
 
 class KeyChange(Model):
@@ -98,11 +98,11 @@ def _with_defaults(model: type[Model], recorded: FileValues) -> dict[str, JsonVa
     return {**dict(_leaves(read.model_dump(mode="json"))), **dict(_leaves(recorded))}
 
 
-def setup_changes(before: object, after: object, files: tuple[str, str] = ("experiment", "gun")) -> list[KeyChange]:
-    """The keys that differ between two setups as journals hold them; `files`: what their parts are called."""
+def setup_changes(before: object, after: object, files: Sequence[str] = (*_OF_SETUP,)) -> list[KeyChange]:
+    """The keys that differ between two setups as journals hold them; `files`: what their first parts are called."""
     return [
         change
-        for file, (part, model) in zip(files, _OF_SETUP.items(), strict=True)
+        for file, (part, model) in zip(files, _OF_SETUP.items(), strict=False)
         for change in changed_keys(file, table_in(before, part), table_in(after, part), model)
     ]
 
