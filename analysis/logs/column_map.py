@@ -29,7 +29,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_LOG, BadLogError
-from analysis.logs.mapped_people import ShortText, alike, check_person, code_in
+from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
@@ -196,7 +196,7 @@ def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[Mapp
             nobodys.append(bad)
     if not people:
         raise nobodys[0]
-    same = alike(code for _, code in people)
+    same = same_letters(code for _, code in people)
     found = [
         MappedLog(
             study=study,

@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
-from analysis.logs.mapped_people import ShortText, alike, check_person, code_in
+from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from device.messages import first_few
 from experiments.config.door import Model
@@ -94,7 +94,7 @@ def read_levels(paths: Sequence[Path], mapping: LevelMap) -> MappedLevels:
 def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap) -> list[_Row]:
     """Rows with an answer; whoever did not answer tells nothing. `BadLogError`: what is wrong, and with which rows."""
     rows, faults, column = list[_Row | None](), list[BadLogError](), mapping.participant.column
-    people, same = dict[str, str](), alike(line.cells[column] for line in lines) if column else ()
+    people, same = dict[str, str](), same_letters(line.cells[column] for line in lines) if column else ()
     for line in lines:
         try:
             code, text = _whose(line, file_name, mapping)

@@ -69,9 +69,7 @@ def _group(pattern: str, text: str) -> str | None:
     return group_in(text, pattern) or None
 
 
-def check_person(
-    code: str, where: ParticipantMapping, line: int, cells: Sequence[str], alike: Collection[str] = ()
-) -> None:
+def check_person(code: str, where: ParticipantMapping, line: int, cells: Sequence[str], alike: Collection[str]) -> None:
     """`BadLogError` if a code is none, or if the map made it of several people's `cells`; `line` is their first.
 
     `alike`: the letters and digits that several codes of the file come to.
@@ -87,10 +85,10 @@ def check_person(
         raise BadLogError(f"{both} {rule}", line, where.column)
 
 
-def alike(codes: Iterable[str]) -> frozenset[str]:
+def same_letters(codes: Iterable[str]) -> frozenset[str]:
     """What several of a file's codes come to once they have letters and digits alone, in small letters.
 
-    >>> sorted(alike(["A-1", "A_1", "B_1", "a1"]))
+    >>> sorted(same_letters(["A-1", "A_1", "B_1", "a1"]))
     ['a1']
     """
     counts = Counter(_plain(code).casefold() for code in {*codes})
