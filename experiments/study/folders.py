@@ -94,8 +94,11 @@ def refuse_gone(results: Path, had: Collection[Path], participant_id: str) -> No
 
     Also if the register is, which says who is excluded. Without a code it is asked whether all are.
     """
-    gone = [path for path in had if not path.exists()]
     own = [participant_folder(results, participant_id), results / register.REGISTER_FILE] if participant_id else []
+    own = [path for path in own if path in had]
+    if own and all(path.exists() for path in own):  # then not all is gone, either: of many people that is quick
+        return
+    gone = [path for path in had if not path.exists()]
     if gone and len(gone) == len(had):
         raise PlaceError(
             f"{results.resolve()}: all that was in it is gone: it was moved, or its disk is away. Put it back; or "
