@@ -287,11 +287,21 @@ def test_a_code_without_a_letter_or_digit_has_no_part_that_could_be_one(tmp_path
     assert "[participant] pattern" not in str(problem)
 
 
-def test_two_people_who_are_given_one_code_are_refused(tmp_path: Path) -> None:
-    path = _write(tmp_path / "all.csv", [row for code in ("张伟", "李娜") for row in _psychopy(trial_rows(code))])
-    both = ["[values.participant]", '"张伟" = "P01"', '"李娜" = "P01"']
-    (problem,) = _read(path, "\n".join([EXAMPLE.read_text(encoding="utf-8"), *both])).problems
-    assert "'张伟' and '李娜' are both code 'P01' by [values.participant] (rule: one code a participant" in str(problem)
+def test_a_person_who_is_given_anothers_code_is_refused(tmp_path: Path) -> None:
+    path = _write(tmp_path / "all.csv", [row for code in ("张伟", "P01") for row in _psychopy(trial_rows(code))])
+    given = ["[values.participant]", '"张伟" = "P01"']
+    (problem,) = _read(path, "\n".join([EXAMPLE.read_text(encoding="utf-8"), *given])).problems
+    assert "'张伟' and 'P01' are both code 'P01' by [values.participant] (rule: one code a participant" in str(problem)
+
+
+def test_two_names_that_a_map_lists_under_one_code_are_one_person(tmp_path: Path) -> None:
+    rows = _psychopy(trial_rows("VP 01"))
+    half = len(rows) // 2
+    spelt = [["vp-1", *row[1:]] if n >= half else row for n, row in enumerate(rows)]
+    both = ["[values.participant]", "'VP 01' = 'VP01'", "'vp-1' = 'VP01'"]
+    logs = _read(_write(tmp_path / "all.csv", spelt), "\n".join([EXAMPLE.read_text(encoding="utf-8"), *both]))
+    assert logs.problems == ()
+    assert set(logs.trials["participant_id"]) == {"VP01"}
 
 
 FAULTS: dict[str, tuple[Callable[[str], str], str]] = {

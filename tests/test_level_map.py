@@ -205,16 +205,27 @@ def test_the_shipped_example_is_a_map() -> None:
 
 
 @pytest.mark.parametrize(
-    ("codes", "by"),
+    ("codes", "by", "code"),
     [
-        ("pattern = '([0-9]+)'", "participant.pattern = '([0-9]+)'"),
-        ("[values.participant]\nVP_01 = 'P01'\nXY_01 = 'P01'", "[values.participant]"),
+        ("pattern = '([0-9]+)'", "participant.pattern = '([0-9]+)'", "01"),
+        ("[values.participant]\nVP_01 = 'XY01'", "[values.participant]", "XY01"),
     ],
 )
-def test_two_people_of_a_file_who_come_to_one_code_are_refused(lab: Path, codes: str, by: str) -> None:
+def test_two_people_of_a_file_who_come_to_one_code_are_refused(lab: Path, codes: str, by: str, code: str) -> None:
+    other = "XY_01" if code == "01" else "XY01"
+    (lab / "lab.csv").write_text(f"VP;Reiz;Treffer;Hand\nVP_01;6,5;ja;links\n{other};6,5;ja;links\n")
+    (problem,) = read_levels([lab / "lab.csv"], _with_codes(lab, codes)).problems
+    assert f"'VP_01' and '{other}' are both code '{code}' by {by}" in str(problem)
+
+
+def test_two_names_that_a_map_lists_under_one_code_are_one_person(lab: Path) -> None:
     (lab / "lab.csv").write_text("VP;Reiz;Treffer;Hand\nVP_01;6,5;ja;links\nXY_01;6,5;ja;links\n")
+    codes = "[values.participant]\nVP_01 = 'P01'\nXY_01 = 'P01'"
+    assert read_levels([lab / "lab.csv"], _with_codes(lab, codes)).problems == ()
+
+
+def _with_codes(lab: Path, codes: str) -> LevelMap:
     text, pattern = (lab / "map.toml").read_text(), "pattern = 'VP_(\\d+)'\n"
     kept = text.replace(pattern, f"{codes}\n" if codes.startswith("pattern") else "")
     (lab / "map.toml").write_text(kept if codes.startswith("pattern") else f"{kept}{codes}\n")
-    (problem,) = read_levels([lab / "lab.csv"], load(LevelMap, lab / "map.toml")).problems
-    assert f"'VP_01' and 'XY_01' are both code '{'01' if 'pattern' in by else 'P01'}' by {by}" in str(problem)
+    return load(LevelMap, lab / "map.toml")

@@ -29,7 +29,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_LOG, BadLogError
-from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters
+from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters, unlisted
 from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
@@ -251,8 +251,8 @@ def _records(
     if len(lines) > LONGEST_LOG:
         raise BadLogError(f"participant {code} has {len(lines):,} rows (rule: at most {LONGEST_LOG:,})")
     column = mapping.participant.column
-    cells = [line.cells[column] for line in lines] if column else ()
-    check_person(code, mapping.participant, lines[0].number, cells, same)
+    names = unlisted([line.cells[column] for line in lines] if column else (), mapping.values.participant)
+    check_person(code, mapping.participant, lines[0].number, names, same)
     make = _rating if tables.is_rated(mapping.experiment) else _trial
     rows = [make(line, mapping) | _common(code, line, mapping) for line in lines]
     if tables.is_rated(mapping.experiment) and mapping.columns.trial is None:

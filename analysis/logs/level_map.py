@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_MAPPED, BadLogError, Problem, check_length, find_logs, read_content
-from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters
+from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters, unlisted
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from device.messages import first_few
 from experiments.config.door import Model
@@ -98,7 +98,8 @@ def _answered(lines: Sequence[SeparatedLine], file_name: str, mapping: LevelMap)
     for line in lines:
         try:
             code, text = _whose(line, file_name, mapping)
-            check_person(code, mapping.participant, line.number, (people.setdefault(code, text), text), same)
+            names = unlisted((people.setdefault(code, text), text), mapping.values.participant)
+            check_person(code, mapping.participant, line.number, names, same)
             rows.append(_row(code, line, mapping))
         except BadLogError as bad:
             faults.append(bad)

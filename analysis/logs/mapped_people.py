@@ -81,8 +81,13 @@ def check_person(code: str, where: ParticipantMapping, line: int, cells: Sequenc
     if len(several) > 1:
         by = f"participant.pattern = {where.pattern!r}" if where.pattern else "[values.participant]"
         both = f"{several[0]!r} and {several[1]!r} are both code {code!r} by {by}"
-        rule = "(rule: one code a participant; who has two names in the file is to have one there)"
+        rule = "(rule: one code a participant; list each name of who has several under [values.participant])"
         raise BadLogError(f"{both} {rule}", line, where.column)
+
+
+def unlisted(names: Sequence[str], listed: Mapping[str, str]) -> Sequence[str]:
+    """The names that a code was made of, none where the map lists each of them: so a lab says they are one person."""
+    return () if all(name in listed for name in names) else names
 
 
 def same_letters(codes: Iterable[str]) -> frozenset[str]:
