@@ -298,6 +298,21 @@ class AtConsole(AtDisplay):
         """Click in the middle of a command's button."""
         self.keys.click(*middle(self.look(), name))
 
+    @contextmanager
+    def button_down(self, name: str) -> Iterator[None]:
+        """The mouse's button goes down on a command's, and is let go at the end."""
+        from Xlib import X
+        from Xlib.ext import xtest
+
+        x, y = middle(self.look(), name)
+        display = self.keys.display
+        xtest.fake_input(display, X.MotionNotify, x=x, y=y)
+        xtest.fake_input(display, X.ButtonPress, 1)
+        display.sync()
+        yield
+        xtest.fake_input(display, X.ButtonRelease, 1)
+        display.sync()
+
     def stop(self, reason: str = "enough") -> tuple[int, str]:
         """Stop the run for a reason, close its window, and wait for the program's end."""
         look = self.ready()

@@ -119,6 +119,19 @@ def test_no_menu_takes_the_keys_of_a_run(quick_configs: Path, tmp_path: Path, di
         screen.close()
 
 
+@pytest.mark.parametrize(("name", "state"), [("emergency", "halted"), ("pause", "paused")])
+def test_what_stops_does_so_as_its_button_goes_down(
+    quick_configs: Path, tmp_path: Path, display: str, name: str, state: str
+) -> None:
+    with AtConsole(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        with screen.button_down(name):
+            screen.until(lambda look: look.state == state)
+        time.sleep(HAND_S)
+        assert screen.look().state == state
+
+
 @pytest.mark.parametrize("practises", [True, False], ids=["practice", "run"])
 def test_after_an_emergency_stop_in_a_practice_the_next_one_and_the_run_begin_with_a_test_shot(
     quick_configs: Path, tmp_path: Path, display: str, practises: bool

@@ -117,6 +117,32 @@ def test_a_countdown_in_which_the_console_stood_still_fires_nothing(monkeypatch:
     assert (over.fired, bench.words) == (False, ["disarm", "status", "close"])
 
 
+@pytest.mark.parametrize(("blocked_s", "fires"), [(0.0, True), (0.7, False)])
+def test_nothing_is_fired_while_the_window_does_not_look_at_its_keys(
+    monkeypatch: pytest.MonkeyPatch, blocked_s: float, fires: bool
+) -> None:
+    """A stop that was pressed waits to be heard there; what is blocked for good fires nothing for good."""
+    bench = Bench(monkeypatch, countdown_s=1)
+    now, later_s = bench.clock.now, [0.0]
+    monkeypatch.setattr(bench.clock, "now", lambda: now() + later_s[0])
+
+    def counting() -> None:
+        bench.check.beats.beat()
+        later_s[0] = blocked_s  # and no beat comes any more
+        if fires:
+            threading.Thread(target=beat, daemon=True).start()
+
+    def beat() -> None:
+        while bench.told[-1].phase != "over":
+            bench.check.beats.beat()
+            threading.Event().wait(0.02)
+
+    bench.at["counting"] = counting
+    over = bench.carry_out()
+    assert (over.fired, "fire" in bench.words) == (fires, fires)
+    assert fires or "stood still in the countdown: nothing was fired" in over.text
+
+
 # as the run drives it
 
 

@@ -412,6 +412,30 @@ def test_nobody_begins_where_the_register_is_gone_which_says_who_is_excluded(ope
     assert window.choice is not None
 
 
+def test_nobody_is_excluded_in_a_new_register_where_the_old_one_is_gone(opened: Open, study: StudyFolder) -> None:
+    """It would say of everybody else that they may begin."""
+    for code in ("P01", "P02"):
+        do(study, code, records=20)
+        join(study, code)
+    window = opened()
+    register = study.results / "participants.jsonl"
+    register.rename(away := study.results.parent / "away")
+    fill(window, "P01")
+    key(window, "E", ALT)
+    assert window.question is not None
+    window.question.reason.setText("left")
+    key(window, "D", CTRL)
+    assert "participants.jsonl: was there, and is gone" in said(window)
+    assert not register.exists()
+    away.rename(register)
+    fill(window, "P01")
+    key(window, "E", ALT)
+    assert window.question is not None
+    window.question.reason.setText("left")
+    key(window, "D", CTRL)
+    assert "left" in register.read_text(encoding="utf-8")
+
+
 def test_that_somebody_is_new_gives_way_to_why_they_may_not_begin(opened: Open) -> None:
     window = opened()
     fill(window, "P03", again="P04")
@@ -1063,6 +1087,31 @@ def test_a_double_click_on_the_button_of_the_test_shot_neither_stops_it_nor_call
     QTest.mouseClick(under, Qt.MouseButton.LeftButton, pos=under.mapFrom(window, place))
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == "Fired"
+
+
+@pytest.mark.parametrize(("name", "title"), [("stop_button", "EMERGENCY STOP"), ("call_off_button", "Not fired")])
+def test_a_button_that_stops_a_test_shot_does_so_as_it_goes_down(opened: Open, name: str, title: str) -> None:
+    """And what came of it stays there as it is let go."""
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    button = getattr(window.shots, name)
+    QTest.mousePress(button, Qt.MouseButton.LeftButton)
+    until(lambda: not window.shots.is_running)
+    QTest.mouseRelease(button, Qt.MouseButton.LeftButton)
+    assert window.shots.title.text() == title
+    assert window.pages.currentWidget() is window.shots
+
+
+def test_a_stop_was_heard_though_another_window_had_the_keys_behind_it(opened: Open) -> None:
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, "F12")
+    window.shots.call_off("Another window had the keys.")
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "EMERGENCY STOP"
+    assert "Another window" not in window.shots.detail.toPlainText()
 
 
 def test_an_escape_that_is_held_calls_off_and_does_not_leave_what_came_of_it(opened: Open) -> None:

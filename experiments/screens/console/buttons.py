@@ -7,7 +7,6 @@ from typing import Protocol
 
 from PyQt6 import QtGui, QtWidgets
 from PyQt6.QtCore import QEvent, Qt
-from PyQt6.QtGui import QMouseEvent
 
 from experiments.screens.console import widgets
 from experiments.screens.console.keys import ANSWERS, BY_NAME, Name, button_lines, choices_at, field_at, shown_key
@@ -34,8 +33,12 @@ class Mouse(Protocol):
         """It was let go."""
 
 
-class CommandButton(QtWidgets.QPushButton):
-    """A button of a command. It never takes the keys, and the second press of a double click is none."""
+_AT_ONCE: frozenset[Name] = frozenset(["emergency", "pause"])
+"""What stops does so as its button goes down."""
+
+
+class CommandButton(widgets.AtOnce):
+    """A button of a command. It never takes the keys."""
 
     def __init__(self, name: Name, mouse: Mouse, style: str = "") -> None:
         super().__init__()
@@ -48,6 +51,8 @@ class CommandButton(QtWidgets.QPushButton):
         if name == "rearm":  # it has to be held
             self.pressed.connect(lambda: mouse.hold(self._press))
             self.released.connect(mouse.let_go)
+        elif name in _AT_ONCE:
+            self.pressed.connect(lambda: mouse.do(self.name, self._press))
         else:
             self.clicked.connect(lambda _: mouse.do(self.name, self._press))
         self.label()
@@ -61,11 +66,6 @@ class CommandButton(QtWidgets.QPushButton):
         shown = "\n".join(filter(None, (text or BY_NAME[self.name].text, f"[{key}]")))
         if (shown := shown.replace("&", "&&")) != self.text():  # one alone would mark a key of Qt's
             self.setText(shown)
-
-    def mouseDoubleClickEvent(self, event: QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
-        """The second press of a double click is the same intent as the first."""
-        if event is not None:
-            event.accept()
 
 
 class Slots(QtWidgets.QWidget):

@@ -31,12 +31,13 @@ from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
+from experiments.screens.console.over_all import AnyHeld
 from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of, noise_of
 from experiments.screens.console.start import SIMULATED, choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
-from experiments.screens.console.windows import AnyHeld, FreshShortcuts, let_go, signals_to
+from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
@@ -326,7 +327,7 @@ def while_shown(text: str, make: Callable[[], Made], emergency: Callable[[], Non
         shown.setText(phrase("EMERGENCY STOP"))
         emergency()
 
-    AnyHeld(shown, Qt.Key.Key_F12, stop)
+    AnyHeld(shown, "F12", stop)
     made: Future[Made] = Future()
 
     def work() -> None:

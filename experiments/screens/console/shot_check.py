@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from PyQt6.QtCore import Qt, pyqtSignal
+from PyQt6.QtCore import Qt, QTimer, pyqtSignal
 from PyQt6.QtWidgets import QVBoxLayout, QWidget
 
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
@@ -29,11 +29,14 @@ from experiments.record.owed_shot import OWED_FILE, DebtKeeper, OwedShot, owe_sh
 from experiments.record.tables import is_simulated
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
+from experiments.screens.console.over_all import NoMenus
 from experiments.screens.console.widgets import TextLines
 from experiments.screens.phrases import phrase
-from experiments.session.judging import STANDSTILL_S
+from experiments.session.judging import STANDSTILL_S, Beats
 
 COUNTDOWN_S = 3
+STOOD_STILL = phrase("The console stood still in the countdown: nothing was fired.")
+_BEAT_MS, _LOOK_S = 100, 0.02
 SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
 
@@ -61,6 +64,8 @@ class ShotCheck:
     ) -> None:
         self._setup, self._method, self._address = setup, method, address
         self._clock, self._tell = clock, tell
+        self.beats = Beats(clock.now)
+        """Of the window that hears what is pressed."""
         self._latched, self._off = threading.Event(), threading.Event()
         self._gun: Gun | None = None
         self.gun_name = ""
@@ -122,24 +127,34 @@ class ShotCheck:
         return f"{outcome} {state}", "bad" if self._latched.is_set() or not is_safe else mood
 
     def _fire(self, gun: Gun, drive: Drive) -> str:
+        began_s = self._clock.now()
         for seconds in range(COUNTDOWN_S, 0, -1):
             told_s = self._clock.now()
             self._tell(ShotProgress(phase="counting", seconds=seconds))
             if self._off.wait(1.0):
                 break
             if self._clock.now() - told_s > 1.0 + STANDSTILL_S:  # what was pressed meanwhile is not heard yet
-                return phrase("The console stood still in the countdown: nothing was fired.")
+                return STOOD_STILL
         if not self._off.is_set():
-            self._report = self._armed_shot(gun, drive)
+            self._report = self._armed_shot(gun, drive, began_s)
+            if self._report is None and not self._off.is_set():
+                return STOOD_STILL
         return phrase("Nothing was fired.") if self._report is None else report_text(self._label, self._report, drive)
 
-    def _armed_shot(self, gun: Gun, drive: Drive) -> ShotReport | None:
+    def _armed_shot(self, gun: Gun, drive: Drive, began_s: float) -> ShotReport | None:
         """As the runner fires the first shot of a stimulus: armed for it alone, as soon as the magnet is home."""
         self._tell(ShotProgress(phase="firing"))
         gun.arm()
-        if self._off.wait(max(0.0, gun.status().ready_at_s - self._clock.now())):
+        if self._off.wait(max(0.0, gun.status().ready_at_s - self._clock.now())) or not self._is_heard(began_s):
             return None
         return gun.fire(Shot(method=self._method, direction="forward", drive=drive))
+
+    def _is_heard(self, began_s: float) -> bool:
+        """Whether all that was pressed since a countdown began was heard: the window neither stood still nor does."""
+        give_up_s = self._clock.now() + STANDSTILL_S
+        while not self.beats.prompt and self._clock.now() < give_up_s and not self._off.wait(_LOOK_S):
+            pass
+        return self.beats.prompt and self.beats.alive_since_s <= began_s
 
     def _disarmed(self, gun: Gun) -> GunStatus | None:
         """The state read back from the gun once it was told to disarm; `None` if it does not say."""
@@ -228,6 +243,9 @@ class ShotPage(QWidget):
         self._gun_name = self._unkept = self._why = ""
         self._shown_detail = ("", "wait")
         self.told.connect(self._take)
+        self._beat = QTimer(self)
+        self._beat.timeout.connect(self._beats)
+        self._beat.start(_BEAT_MS)
         self.unkept.connect(self._say_unkept)
         self._build()
 
@@ -238,9 +256,11 @@ class ShotPage(QWidget):
             TextLines("detail", most_lines=9),
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
+        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape, at_once=True)
         self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
-        self.stop_button = widgets.button(self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop")
+        self.stop_button = widgets.button(
+            self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop", at_once=True
+        )
         down = widgets.fill(QVBoxLayout(self), self.title, self.detail, self.count)
         down.addStretch(1)
         widgets.fill(down, self.stop_button, self.call_off_button, self.next_button)
@@ -248,11 +268,16 @@ class ShotPage(QWidget):
         kept = self.next_button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)
         self.next_button.setSizePolicy(kept)
+        NoMenus(self)
 
     @property
     def owed_text(self) -> str:
         """Why a test shot comes first; empty where none is owed."""
         return phrase("The last test shot ended by an emergency stop.") if self.owed else ""
+
+    def _beats(self) -> None:
+        if self._check is not None:
+            self._check.beats.beat()
 
     @property
     def is_running(self) -> bool:
@@ -352,7 +377,7 @@ class ShotPage(QWidget):
 
     def call_off(self, why: str = "") -> None:
         """Fire no more, if it has not fired."""
-        if self._check is not None:
+        if self._check is not None and not self.stopped:
             self._why = why
             self._check.call_off()
 
@@ -404,8 +429,7 @@ class ShotPage(QWidget):
         self.detail.say(" ".join(filter(None, [detail, unkept])), "bad" if unkept else mood)
 
     def _running(self, running: bool) -> None:
-        if not running:
-            self.call_off_button.setFocus()  # a key pressed behind the shot stops nothing and fires nothing
+        self.call_off_button.setFocus()  # Space calls off, and behind the shot stops nothing and fires nothing
         self.next_button.setVisible(not (running or self.stopped))
         self.next_button.setText(phrase("{next}  [Ctrl+T]", next=self.next_text()))
         self.call_off_button.setText(phrase("Call it off  [Esc]") if running else phrase("Back  [Esc]"))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from PyQt6 import QtWidgets
-from PyQt6.QtCore import QEvent, QEventLoop, Qt, pyqtSignal
+from PyQt6.QtCore import QEvent, QEventLoop, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent
 
 from device.messages import RecoilError
@@ -19,6 +19,7 @@ from experiments.record.journal import JournalError
 from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
+from experiments.screens.console.over_all import AnyHeld
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.phrases import phrase
@@ -113,8 +114,8 @@ class StartWindow(QtWidgets.QWidget):
         self.form.experiment_edited.connect(self._show_choice)
         self.shots.left.connect(self._leave_shots)
         self.shots.over = self._shot_over
-        windows.AnyHeld(self, Qt.Key.Key_F12, self._emergency_stop)
-        windows.AnyHeld(self, Qt.Key.Key_Escape, self.shots.call_off, when=lambda: self.shots.is_running)
+        AnyHeld(self, "F12", self._emergency_stop)
+        AnyHeld(self, "Esc", self.shots.call_off, when=lambda: self.shots.is_running)
 
     # showing
 
@@ -386,11 +387,12 @@ class StartWindow(QtWidgets.QWidget):
 
     def _change(self, act: Callable[[], None]) -> None:
         """Change the register, and show how things stand then."""
-        self._take_back()
-        try:
+
+        def changed() -> bool:
             act()
-        except (PlaceError, JournalError) as error:
-            self._refused(str(error))
+            return True
+
+        if self._checked(changed, theirs=True) is None:
             return
         self._fill()
         self._show_choice()

@@ -13,7 +13,7 @@ from string import Template
 from typing import TypeVar
 
 from PyQt6 import QtGui, QtWidgets
-from PyQt6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt
+from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 
 from experiments.screens.participant.messages import Theme
 from experiments.screens.phrases import phrase
@@ -71,7 +71,6 @@ def _styled(file: str, theme: Theme, kinds: Sequence[str]) -> str:
 
 
 Slot = Callable[[], object]
-NO_MENU = Qt.ContextMenuPolicy.PreventContextMenu
 NO_FOCUS = Qt.FocusPolicy.NoFocus
 
 
@@ -99,13 +98,30 @@ def restyle(widget: QtWidgets.QWidget) -> None:
         style.polish(widget)
 
 
-def button(parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "") -> QtWidgets.QPushButton:
-    """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen."""
-    made = QtWidgets.QPushButton(f"{text}  [{key.replace('Return', 'Enter')}]")
+class AtOnce(QtWidgets.QPushButton):
+    """A button that acts as it goes down, by `pressed`. The second press of a double click is none."""
+
+    def mouseDoubleClickEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
+        """It is the same intent as the first."""
+        if event is not None:
+            event.accept()
+
+
+def button(
+    parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "", at_once: bool = False
+) -> QtWidgets.QPushButton:
+    """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen.
+
+    `at_once`: what stops acts as the button goes down, the others as it is let go.
+    """
+    made = (AtOnce if at_once else QtWidgets.QPushButton)(f"{text}  [{key.replace('Return', 'Enter')}]")
     made.setObjectName(name)
     made.setAccessibleName(text)
     made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    made.clicked.connect(lambda _: slot())
+    if at_once:
+        made.pressed.connect(slot)
+    else:
+        made.clicked.connect(lambda _: slot())
 
     def pressed() -> None:
         if made.isVisible():
@@ -124,15 +140,11 @@ Part = QtWidgets.QWidget | QtWidgets.QLayout
 def fill(
     layout: _Box, *parts: Part | tuple[Part, int], margins: tuple[int, int, int, int] | None = (0, 0, 0, 0)
 ) -> _Box:
-    """Put widgets and layouts into a layout, each with its stretch where it has one. No margins: those of the style.
-
-    None has a menu of its own: as long as one is open it has every key, and F12 is not heard.
-    """
+    """Put widgets and layouts into a layout, each with its stretch where it has one. No margins: those of the style."""
     if margins is not None:
         layout.setContentsMargins(*margins)
     for part, stretch in (part if isinstance(part, tuple) else (part, 0) for part in parts):
         if isinstance(part, QtWidgets.QWidget):
-            part.setContextMenuPolicy(NO_MENU)
             layout.addWidget(part, stretch)
         else:
             layout.addLayout(part, stretch)
@@ -241,18 +253,6 @@ class ListBox(QtWidgets.QComboBox):
         self.setMinimumContentsLength(10)
         self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Expanding, QtWidgets.QSizePolicy.Policy.Fixed)
 
-    def showPopup(self) -> None:  # noqa: N802 - Qt's name
-        """Open the list, which has every key from then on; a style may have made it anew."""
-        super().showPopup()
-        if (shown := self.view()) is not None:
-            shown.installEventFilter(self)
-
-    def eventFilter(self, watched: QObject | None, event: QEvent | None) -> bool:  # noqa: N802 - Qt's name
-        """Have the window hear F12 from the list as well."""
-        if isinstance(event, QtGui.QKeyEvent) and event.key() == Qt.Key.Key_F12:
-            return QtWidgets.QApplication.sendEvent(self.window(), event)
-        return super().eventFilter(watched, event)
-
     def wheelEvent(self, event: QtGui.QWheelEvent | None) -> None:  # noqa: N802 - Qt's name
         """Leave the wheel to what is scrolled."""
         if event is not None:
@@ -261,10 +261,6 @@ class ListBox(QtWidgets.QComboBox):
 
 class LineEdit(QtWidgets.QLineEdit):
     """A line of text. Enter goes on to the next field, and a held Enter no further."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setContextMenuPolicy(NO_MENU)
 
     def keyPressEvent(self, event: QtGui.QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
         """Take a key."""

@@ -324,27 +324,6 @@ class FreshShortcuts(QtCore.QObject):
         return key == self._stale
 
 
-class AnyHeld(QtCore.QObject):
-    """Has a key act in a window whatever else is held: with Ctrl beside it Qt takes it for another shortcut."""
-
-    def __init__(
-        self, window: QWidget, key: QtCore.Qt.Key, act: Callable[[], object], when: Callable[[], bool] = lambda: True
-    ) -> None:
-        super().__init__(window)
-        self._key, self._act, self._when = key, act, when
-        window.installEventFilter(self)
-
-    def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
-        """Take the key before it is looked for among the shortcuts, and as it is pressed."""
-        del watched
-        if not isinstance(event, QKeyEvent) or event.key() != self._key or not self._when():
-            return False
-        if event.type() == QtCore.QEvent.Type.KeyPress and not event.isAutoRepeat():
-            self._act()
-        event.accept()
-        return True
-
-
 def _may_be_shortcut(event: QKeyEvent) -> bool:
     """Whether a key is no text, nor moves within it."""
     held = event.modifiers() & (QtCore.Qt.KeyboardModifier.ControlModifier | QtCore.Qt.KeyboardModifier.AltModifier)

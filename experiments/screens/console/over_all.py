@@ -1,0 +1,71 @@
+"""What is above every widget of a window: keys that stop the gun, which no menu and no list may take for itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PyQt6 import QtCore
+from PyQt6.QtGui import QKeyEvent
+from PyQt6.QtWidgets import QApplication, QWidget
+
+from experiments.screens.console.windows import key_name
+
+
+class _OverAll(QtCore.QObject):
+    """Sees every event of this program while a window is shown: a menu or a list that is open takes keys for itself."""
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        self._window, self._shown = window, False
+        window.installEventFilter(self)
+
+    def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
+        """Begin and end with the window, of which nothing is left behind that; true keeps an event to itself."""
+        app = QApplication.instance()
+        if event is None or app is None:
+            return False
+        if watched is self._window and event.type() == QtCore.QEvent.Type.Show:
+            self._shown = True
+            app.installEventFilter(self)
+        elif watched is self._window and event.type() == QtCore.QEvent.Type.Hide:
+            self._shown = False
+            app.removeEventFilter(self)
+        return self._shown and self.takes(watched, event)
+
+    def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
+        """Whether an event is for this alone."""
+        raise NotImplementedError
+
+
+class AnyHeld(_OverAll):
+    """Has a key act in a window whatever else is held, and whatever menu or list is open there.
+
+    With Ctrl beside it Qt takes it for another shortcut.
+    """
+
+    def __init__(
+        self, window: QWidget, key: str, act: Callable[[], object], when: Callable[[], bool] = lambda: True
+    ) -> None:
+        super().__init__(window)
+        self._key, self._act, self._when = key, act, when
+
+    def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
+        """Take the key before it is looked for among the shortcuts, and as it is pressed."""
+        del watched
+        if not isinstance(event, QKeyEvent) or key_name(event) != self._key or not self._when():
+            return False
+        if event.type() == QtCore.QEvent.Type.KeyPress and not event.isAutoRepeat():
+            if (popup := QApplication.activePopupWidget()) is not None:
+                popup.close()
+            self._act()
+        event.accept()
+        return True
+
+
+class NoMenus(_OverAll):
+    """Keeps menus shut while a page is shown: an open one takes the first click, also one on EMERGENCY STOP."""
+
+    def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
+        """Take what asks for a menu."""
+        asks = event.type() == QtCore.QEvent.Type.ContextMenu
+        return asks and isinstance(watched, QWidget) and watched.window() is self._window.window()
