@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.load import load_setup, shipped_folder
-from experiments.screens.console.participant_link import check_own_keys
+from experiments.screens.console.participant_opening import check_own_keys
 from experiments.study.folders import PlaceError
 from tests.at_display import AtConsole, needs_display, virtual_display
 from tests.at_runs import words

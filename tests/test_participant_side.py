@@ -19,7 +19,8 @@ from experiments.design import planning
 from experiments.live_run import LiveRun
 from experiments.load import load_setup
 from experiments.run_request import RunRequest
-from experiments.screens.console.participant_link import PAUSED, ParticipantSide, look_of
+from experiments.screens.console.participant_link import PAUSED, ParticipantSide
+from experiments.screens.console.participant_opening import look_of
 from experiments.screens.console.view import Message, ParticipantSeen, Trouble
 from experiments.screens.participant.link import ParticipantLink
 from experiments.screens.participant.messages import (

@@ -32,7 +32,8 @@ from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
 from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
 from experiments.screens.console.over_all import AnyHeld
-from experiments.screens.console.participant_link import ParticipantSide, check_font, check_own_keys, look_of, noise_of
+from experiments.screens.console.participant_link import ParticipantSide, noise_of
+from experiments.screens.console.participant_opening import check_font, check_own_keys, look_of
 from experiments.screens.console.start import SIMULATED, choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
