@@ -69,12 +69,16 @@ def rate_by_keys(screen: AtConsole) -> None:
 
 
 def rate_here(screen: AtConsole) -> None:
-    """The experimenter's rating and the description they are told, although the participant's screen asks for both."""
+    """The experimenter's rating and the description they are told, although the participant's screen asks for both.
+
+    They type the one behind the other: the page to describe it on takes no key of that.
+    """
+    screen.until(lambda look: look.active)
+    before = len(screen.watch.looks())
     screen.go_on(screen.at("rating"))
     screen.participant_shows("DescriptionPage", 2)
-    screen.focus_on(RUN)
-    screen.until(lambda look: look.active)
     screen.go_on(screen.at("describing"))
+    assert all(look.active for look in screen.watch.looks()[before:] if look.state == "describing")
 
 
 def plays_sound(home: Path) -> bool:

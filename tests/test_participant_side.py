@@ -33,6 +33,7 @@ from experiments.screens.participant.messages import (
     line,
 )
 from experiments.screens.texts import ordinal, place_text
+from experiments.session.events import Answer, Rating
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Asking
@@ -136,6 +137,28 @@ def test_between_a_rating_and_its_description_the_participants_window_keeps_the_
     }  # fmt: skip
     asked = next(word for word in told.all if word["kind"] == "ask-description")
     assert (asked["number"], asked["of"], asked["question"]) == (1, 3, "?")
+
+
+def test_a_page_leaves_the_keys_to_the_console_where_the_one_before_was_answered_there_and_else_takes_them(
+    told: Told,
+) -> None:
+    typed, number = (3, Rating(rating=5.0)), 3
+    for step, entered in ((STEP, None), (describe(TRIAL), typed), (STEP, typed), (STEP, (5, typed[1]))):
+        told.side.follow(Position(states=(State.RATING,), serial=2 * number, number=number, step=step, entered=entered))
+        wait_for(lambda: told.words and told.words[-1].startswith("ask"))
+        told.side.follow(Position(states=(State.SAVING,), serial=2 * number + 1, number=number, step=step))
+        wait_for(lambda: told.words[-1] == BETWEEN)
+        number += 1
+    asked = [word["keep_keys"] for word in told.all if word["kind"].startswith("ask")]
+    assert asked == [False, True, False, True]
+
+
+def test_where_an_answer_without_a_page_was_entered_at_the_console_the_next_page_takes_the_keys(told: Told) -> None:
+    told.side.follow(Position(states=(State.ASKING,), serial=1, number=3, step=ask(TRIAL)))
+    answer = Answer(response="forward", at_s=0.0)
+    told.side.follow(Position(states=(State.RATING,), serial=2, number=4, step=STEP, entered=(3, answer)))
+    wait_for(lambda: told.words[-1:] == ["ask-rating"])
+    assert told.all[-1]["keep_keys"] is False
 
 
 def test_a_trial_has_one_number_on_the_participants_screen_and_at_the_console_also_in_a_later_session_or_set(

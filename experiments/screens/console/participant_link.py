@@ -83,6 +83,8 @@ class ParticipantSide:
         self._closed = self._starting = False
         self._draft: messages.Draft | None = None
         """What stands on the participant's page and was not given yet."""
+        self._typed_on = set[int]()
+        """The steps that had a page to type on."""
         self.covered = False
         """Whether a line or a page of the console takes what is typed: the participant's keys are not told from it."""
 
@@ -240,6 +242,7 @@ class ParticipantSide:
                     grain=step.grain,
                     distinct=step.distinct,
                     taken=self._taken(step),
+                    keep_keys=self._leaves_keys(position),
                     draft=position.number,
                 ),
                 wanted=wanted,
@@ -247,6 +250,15 @@ class ParticipantSide:
             event = events.ParticipantRated(rating=given.rating, step=position.number, by=self._hand)
             if self._offered(event, step.trial):
                 return  # else a correction gave that rank to another one meanwhile
+
+    def _leaves_keys(self, position: Position) -> bool:
+        """Whether a page leaves keys and front to the console, as the one before was answered at the console.
+
+        Who did so may still be typing: a page that took the keys would have the rest as the participant's own words.
+        """
+        self._typed_on.add(position.number)
+        before = position.number - 1
+        return before in self._typed_on and position.entered_for(before) is not None
 
     def _taken(self, step: Step | None) -> tuple[float, ...]:
         """The ranks that are no longer free."""
@@ -261,9 +273,11 @@ class ParticipantSide:
 
     def _described(self, step: Describe, position: Position, wanted: Wanted) -> None:
         number, of = self._place(step)
-        given = self._link.ask_description(
-            messages.AskDescription(number=number, of=of, question=step.text, draft=position.number), wanted=wanted
+        keep_keys = self._leaves_keys(position)
+        question = messages.AskDescription(
+            number=number, of=of, question=step.text, keep_keys=keep_keys, draft=position.number
         )
+        given = self._link.ask_description(question, wanted=wanted)
         self._offered(events.ParticipantDescribed(text=given.comment, step=position.number, by=self._hand), step.trial)
 
     def _offered(self, event: OwnHandEvent, trial: Trial | None) -> bool:

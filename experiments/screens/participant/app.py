@@ -186,9 +186,9 @@ class App:
                     self._called_off = page, self._told_s
                 self._stage.put(MessagePage(self._stage, word.text), keep_keys=word.keep_keys)
             case messages.AskRating():
-                self._stage.put(RatingPage(self._stage, word, self._drafts_of(word)))
+                self._stage.put(RatingPage(self._stage, word, self._drafts_of(word)), keep_keys=word.keep_keys)
             case messages.AskDescription():
-                self._stage.put(DescriptionPage(self._stage, word, self._drafts_of(word)))
+                self._stage.put(DescriptionPage(self._stage, word, self._drafts_of(word)), keep_keys=word.keep_keys)
             case messages.AskChoice():
                 self._stage.put(ChoicePage(self._stage, word, self._keys))
             case messages.Noise():

@@ -48,7 +48,8 @@ class AskRating:
     """Ask for a rating of one of several stimuli, named by its order of presentation.
 
     Asked again with the same `draft`, it begins with the marker where it stood; so does a description with its words.
-    `distinct`: each has one of its own, as ranks are; `taken`: those that were given to others.
+    `distinct`: each has one of its own, as ranks are; `taken`: those that were given to others. `keep_keys`: the window
+    does not take the keys, as whoever has them may still type.
     """
 
     number: int
@@ -61,6 +62,7 @@ class AskRating:
     grain: _Positive
     distinct: bool = False
     taken: tuple[_Finite, ...] = ()
+    keep_keys: bool = False
     draft: int = 0
     ask: int = 0
     kind: Literal["ask-rating"] = "ask-rating"
@@ -68,11 +70,12 @@ class AskRating:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskDescription:
-    """Ask for a description of one of several stimuli, named by its order of presentation."""
+    """Ask for a description of one of several stimuli, named by its order of presentation. `keep_keys` as there."""
 
     number: int
     of: int
     question: str
+    keep_keys: bool = False
     draft: int = 0
     ask: int = 0
     kind: Literal["ask-description"] = "ask-description"

@@ -137,17 +137,15 @@ class Stage:
 
         What was done before it stands is done to the page that stood there: a second click is no rating, and a key
         that is held still does nothing on this one.
-        `keep_keys`: until the next one to type on the keys stay, so that no key goes to another window meanwhile.
+        `keep_keys`: the keys stay where they are, so that none of what is being typed goes to another window.
         """
         self.window.winHandle.dispatch_events()
         self._handlers.hear_new_keys()
         self.page.leave()
         self.page = page
         self.window.mouseVisible = page.pointer
-        if page.typed:
-            self.focus.take()
-        elif not keep_keys:
-            self.focus.give_back()
+        if not keep_keys:
+            (self.focus.take if page.typed else self.focus.give_back)()
         self.drawn_s = 0.0
 
     def step(self) -> None:
