@@ -213,6 +213,38 @@ def test_a_participants_key_is_a_response_time_from_the_onset_of_the_shot_and_in
     assert (fourth["response"], fourth["response_source"]) == ("backward", "participant")
 
 
+def test_on_one_screen_a_question_for_the_participants_keys_is_seen_until_it_is_answered_or_the_console_is_worked(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    def seen(screen: AtConsole, title: str) -> None:
+        wait_for(lambda: title in screen.keys.title_at(700, 450), lambda: screen.keys.title_at(700, 450))
+
+    run = words(quick_configs, "direction", "--participant", "P01", "--participant-keys")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking", trial=1)
+        seen(screen, PARTICIPANT)
+        assert screen.look().active  # its keys are the console's still
+        screen.keys.press("Up")
+        screen.at("setting", "preparing")
+        seen(screen, RUN)
+        screen.to("asking", trial=2)
+        seen(screen, PARTICIPANT)
+        screen.keys.press("n")
+        screen.until(lambda look: look.line)
+        seen(screen, RUN)
+        screen.keys.press("Up")
+        screen.until(lambda look: look.says("The participant’s answer was not taken."))
+        screen.participant_shows("ChoicePage", 3)
+        seen(screen, RUN)
+        screen.keys.press("Escape")
+        screen.until(lambda look: not look.line)
+        screen.keys.press("Down")
+        screen.to("asking", trial=3)
+        seen(screen, PARTICIPANT)
+        is_stopped_by_f12(screen)
+
+
 def a_key_goes_into_a_note_and_a_page(screen: AtConsole, journal: Path, shown: int) -> None:
     """The participant's key is refused while the experimenter types or reads; then the question stands there again."""
     for count, (opened, why) in enumerate((("n", lambda look: look.line), ("F1", lambda look: look.page)), shown + 1):

@@ -10,6 +10,14 @@ _NAMES = {" ": "space", "\n": "Return", ".": "period", "-": "minus", ",": "comma
 class TypingHands(Hands):
     """Two hands that type."""
 
+    def title_at(self, x_px: int, y_px: int) -> str:
+        """The title of the window that is to be seen at a place of the display."""
+        window = root = self.display.screen().root
+        sign, title = self.display.intern_atom("_NET_WM_NAME"), ""
+        while not title and (window := window.translate_coords(root, x_px, y_px).child):
+            title = window.get_full_text_property(sign) or window.get_wm_name() or ""
+        return str(title)
+
     def type(self, text: str) -> None:
         """Type text of letters, digits and blanks, and what stands in `_NAMES`."""
         for letter in text:

@@ -201,7 +201,8 @@ class ParticipantSide:
             step=position.number,
         )
         while wanted() and not self._keyed(step, question, position, wanted):
-            question = replace(question, once_seen=True)  # it was refused: the next key counts
+            # it was refused: the next key counts, and what is open at the console stays in front
+            question = replace(question, once_seen=True, keep_keys=True)
 
     def _numbered(self, step: Ask) -> str:
         return self._messages.numbered.format(number=self._place(step)[0], question=step.text)

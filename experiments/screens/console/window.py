@@ -373,7 +373,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         return self.about.participant_keys and key in self._own_arrows
 
     def down(self, name: Name, at_s: float) -> None:
-        """The key of a command went down."""
+        """The key of a command went down: what it does is to be seen, where a question is in front of the console."""
+        self.raise_()
         if self.controls is None:
             self.do(name, self.press())
         else:

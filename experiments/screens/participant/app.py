@@ -190,7 +190,7 @@ class App:
             case messages.AskDescription():
                 self._stage.put(DescriptionPage(self._stage, word, self._drafts_of(word)), keep_keys=word.keep_keys)
             case messages.AskChoice():
-                self._stage.put(ChoicePage(self._stage, word, self._keys))
+                self._stage.put(ChoicePage(self._stage, word, self._keys), keep_keys=word.keep_keys)
             case messages.Noise():
                 self._wire.say(messages.Beat(within_s=messages.NOISE_S))
                 self._wire.say(self._noise.turn(word))

@@ -28,19 +28,29 @@ class Focus:
 
     def take(self) -> None:
         """Take the keys and come to the front, and keep in mind whose they were."""
-        holder = self._holder()
-        if holder not in (None, self._ours):
-            self._lender = holder or 0
+        self._note_lender()
         self._window.activate()
+        self._raise(self._ours)
+
+    def take_front(self) -> None:
+        """Come to the front without the keys, which the lender has, or has again."""
+        self.give_back()
+        self._note_lender()
         self._raise(self._ours)
 
     def give_back(self) -> None:
         """Let the lender have the keys and the front again, if nobody has taken them since."""
-        if self._lender > _NO_WINDOW and self._holder() == self._ours:
-            xlib = _xlib()
-            xlib.XSetInputFocus(self._window._x_display, self._lender, xlib.RevertToParent, xlib.CurrentTime)
+        if self._lender > _NO_WINDOW and (holder := self._holder()) in (self._ours, self._lender):
+            if holder == self._ours:
+                xlib = _xlib()
+                xlib.XSetInputFocus(self._window._x_display, self._lender, xlib.RevertToParent, xlib.CurrentTime)
             self._raise(self._lender)
         self._lender = 0
+
+    def _note_lender(self) -> None:
+        holder = self._holder()
+        if holder not in (None, self._ours):
+            self._lender = holder or 0
 
     def _raise(self, window: int | None) -> None:
         """On one screen one of the two windows lies upon the other: whoever has the keys is to see theirs."""

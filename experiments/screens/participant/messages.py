@@ -95,12 +95,14 @@ class AskChoice:
     """Ask for one of several answers; a key pressed before `onset_s` is none.
 
     `once_seen`: nor is one that was pressed before the question stood there. `step` names it in the answer.
+    `keep_keys`: the window does not come to the front for it.
     """
 
     question: str
     answers: tuple[KeyedAnswer, ...]
     onset_s: _Finite
     once_seen: bool = False
+    keep_keys: bool = False
     step: int = 0
     ask: int = 0
     kind: Literal["ask-choice"] = "ask-choice"

@@ -37,6 +37,8 @@ class ChoicePage(Page):
     refused, only those that go down once it stands there again.
     """
 
+    in_front = True
+
     def __init__(self, stage: Stage, asked: messages.AskChoice, keys: KeyPresses) -> None:
         self._asked, self._keys, self._now = asked, keys, stage.toolkit.now
         self._since_s = math.inf if asked.once_seen else asked.onset_s

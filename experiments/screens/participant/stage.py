@@ -47,6 +47,8 @@ class Page:
 
     pointer = False
     typed = False
+    in_front = False
+    """Whether it is to be seen, though the keys are another window's."""
 
     def moves(self) -> object:
         """What of it moves, as it stands now."""
@@ -137,7 +139,7 @@ class Stage:
 
         What was done before it stands is done to the page that stood there: a second click is no rating, and a key
         that is held still does nothing on this one.
-        `keep_keys`: the keys stay where they are, so that none of what is being typed goes to another window.
+        `keep_keys`: keys and front stay where they are, so that none of what is being typed goes to another window.
         """
         self.window.winHandle.dispatch_events()
         self._handlers.hear_new_keys()
@@ -145,7 +147,8 @@ class Stage:
         self.page = page
         self.window.mouseVisible = page.pointer
         if not keep_keys:
-            (self.focus.take if page.typed else self.focus.give_back)()
+            focus = self.focus
+            (focus.take if page.typed else focus.take_front if page.in_front else focus.give_back)()
         self.drawn_s = 0.0
 
     def step(self) -> None:
