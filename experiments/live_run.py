@@ -129,6 +129,8 @@ class LiveRun:
         self.beats, self._to_fire_s = Beats(clock.now), math.inf
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
+        self.minimised = False
+        """Whether the participant's window is, on which they are asked: no pause ends before it is seen again."""
 
     # for everybody
 
@@ -158,6 +160,7 @@ class LiveRun:
                 pauses=[*self._pauses, *([] if began_s is None else [(began_s, math.inf)])],
                 alive_since_s=self.beats.alive_since_s,
                 gun_silence=self.gun_silence,
+                minimised=self.minimised,
             )
 
     def painted(self, serial: int, at_s: float) -> None:

@@ -15,7 +15,7 @@ from string import ascii_lowercase
 
 import pytest
 
-from tests.at_display import AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
+from tests.at_display import AtConsole, AtDisplay, check_disarmed, needs_display, records, remarks, virtual_display
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
 from tests.waiting import stand_still, wait_for
 from tests.warm_start import warm
@@ -243,6 +243,32 @@ def test_on_one_screen_a_question_for_the_participants_keys_is_seen_until_it_is_
         screen.to("asking", trial=3)
         seen(screen, PARTICIPANT)
         is_stopped_by_f12(screen)
+
+
+def test_a_participants_window_that_is_minimised_holds_the_run_and_is_said_until_it_is_seen_again(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    journal, told = tmp_path / f"{PREFERENCE}_journal.jsonl", "The participant's window is minimised"
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.keys.minimise(PARTICIPANT)
+        look = screen.until(lambda look: look.state == "paused" and look.ready)
+        assert look.says(told)
+        check_disarmed(screen.watch)
+        screen.stands(RUN)
+        screen.keys.press("p")
+        wait_for(lambda: remarks(journal, "refused"))
+        assert screen.heard().state == "paused"
+        screen.keys.bring_back(PARTICIPANT)
+        screen.until(lambda look: not look.says(told))
+        screen.stands(RUN)
+        screen.to("train", trial=2)
+        code, said = screen.stop()
+    assert code == 130, said
+    assert [one["cause"].startswith(told) for one in remarks(journal, "paused")] == [True]
+    assert [one["text"] for one in remarks(journal, "noted")] == ["The participant's window is seen again."]
 
 
 def a_key_goes_into_a_note_and_a_page(screen: AtConsole, journal: Path, shown: int) -> None:

@@ -28,7 +28,7 @@ from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
-from experiments.session.judging import HEARS_LATE, NOTHING_TO_UNDO, STANDSTILL_S, STOOD_STILL
+from experiments.session.judging import HEARS_LATE, MINIMISED, NOTHING_TO_UNDO, STANDSTILL_S, STOOD_STILL
 from experiments.session.remarks import (
     HALTED_BEFORE,
     EntryCorrected,
@@ -1491,6 +1491,21 @@ def test_a_pause_that_was_asked_for_and_one_that_was_not_are_told_apart(tmp_path
         assert sitting.position.why == "its process ended"
         contents = of_journal(sitting)
     assert remarks(contents, Paused) == [Paused(), Paused(cause="its process ended")]
+
+
+def test_no_pause_ends_while_the_participants_window_is_minimised(tmp_path: Path) -> None:
+    with sat(DIRECTION, tmp_path) as sitting:
+        sitting.to(S.PREPARING)
+        sitting.live.minimised = True
+        sitting.live.offer(events.ParticipantLost(cause=MINIMISED))
+        assert (sitting.state, sitting.position.why) == (S.PAUSED, MINIMISED)
+        assert by_hand(sitting, events.GoOn()) == EventVerdict(taken=False, text=MINIMISED)
+        sitting.live.minimised = False
+        sitting.live.offer(events.ParticipantBack(how="It is seen again."))
+        assert by_hand(sitting, events.GoOn()).taken
+        contents = of_journal(sitting)
+    noted = [word.text for word in remarks(contents, Noted) if isinstance(word, Noted)]
+    assert noted == ["It is seen again."]
 
 
 def test_a_participants_screen_that_is_lost_in_a_pause_is_on_record_too(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from experiments.screens.participant.messages import (
     BETWEEN,
     EmergencyPressed,
     Focused,
+    Minimised,
     NoiseBroken,
     NoiseEnded,
     NoiseIs,
@@ -34,6 +35,7 @@ from experiments.screens.participant.messages import (
 )
 from experiments.screens.texts import ordinal, place_text
 from experiments.session.events import Answer, Rating
+from experiments.session.judging import MINIMISED
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Asking
@@ -299,6 +301,60 @@ def test_noise_that_may_have_broken_off_is_said_and_on_record(tmp_path: Path) ->
         link.close()
     assert [one.text for one in told if isinstance(one, Trouble)] == [broken]
     assert not any(one.noise_off for one in told if isinstance(one, ParticipantSeen))
+
+
+HIDDEN, SHOWN = (line(Minimised(on=on)).decode().strip() for on in (True, False))
+
+
+def test_a_window_that_is_minimised_pauses_the_run_until_it_is_seen_again_also_if_it_was_so_before(
+    tmp_path: Path,
+) -> None:
+    program = f"import sys; print({HIDDEN!r}, flush=True)\nfor _ in sys.stdin: print({SHOWN!r}, flush=True)"
+    link = ParticipantLink.start(command=(sys.executable, "-c", program))
+    told: list[Message] = []
+    try:
+        with sat(PREFERENCE, tmp_path) as sitting:
+            side = ParticipantSide(link, lambda: link, PREFERENCE, rates=True, own_keys=False)
+            side.begin(sitting.live, told.append)
+            wait_for(lambda: sitting.state is State.PAUSED)
+            assert (sitting.position.why, sitting.live.minimised) == (MINIMISED, True)
+            link.show("Please wait")
+            again = "The participant's window is seen again."
+            wait_for(lambda: [one.text for one in told if isinstance(one, Trouble)] == [MINIMISED, again])
+            assert (sitting.state, sitting.position.why, sitting.live.minimised) == (State.PAUSED, "", False)
+            assert notes(sitting.live) == [again]
+    finally:
+        link.close()
+
+
+def test_a_window_on_which_nothing_is_asked_may_be_minimised(tmp_path: Path) -> None:
+    said = f"{HIDDEN}\n" + line(Focused(on=False)).decode().strip()
+    program = f"import sys; print({said!r}, flush=True); sys.stdin.read()"
+    link = ParticipantLink.start(command=(sys.executable, "-c", program))
+    try:
+        wait_for(lambda: link.focused)
+        with sat(SETUP, tmp_path) as sitting:
+            side = ParticipantSide(link, lambda: link, SETUP, rates=False, own_keys=False)
+            side.begin(sitting.live, lambda _: None)
+            assert State.PAUSED not in sitting.position.states
+            assert not sitting.live.minimised
+    finally:
+        link.close()
+
+
+@pytest.mark.slow
+def test_a_minimised_window_whose_program_is_gone_holds_nothing_any_more(tmp_path: Path) -> None:
+    program = f"import sys; print({HIDDEN!r}, flush=True); sys.stdin.read()"
+    link = ParticipantLink.start(command=(sys.executable, "-c", program))
+    try:
+        with sat(PREFERENCE, tmp_path) as sitting:
+            side = ParticipantSide(link, lambda: link, PREFERENCE, rates=True, own_keys=False)
+            side.begin(sitting.live, lambda _: None)
+            wait_for(lambda: sitting.live.minimised)
+            os.kill(link.pid, signal.SIGKILL)
+            wait_for(lambda: not sitting.live.minimised)
+    finally:
+        link.close()
 
 
 @pytest.mark.slow

@@ -244,7 +244,7 @@ class LinkLost(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantLost(Event):
-    """The participant's screen is gone."""
+    """The participant's screen is gone, or not to be seen."""
 
     cause: str
 
@@ -252,6 +252,8 @@ class ParticipantLost(Event):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantBack(Event):
     """The participant's screen is there again."""
+
+    how: str = "The participant's screen was started again."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

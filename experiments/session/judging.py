@@ -20,6 +20,7 @@ REARM_HELD_S = 1.0
 STOOD_STILL = "the program stood still for more than 1 s, and nothing was fired after it: look where the gun is"
 HEARS_LATE = "this computer is too busy to hear a stop in time, so nothing fires: close what else runs on it"
 HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
+MINIMISED = "The participant's window is minimised, and they see nothing: bring it back first."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
 STANDSTILL_S = 1.0
@@ -76,7 +77,8 @@ class Moment:
 
     `painted_s` is when the position was on the screen; a press within `guard_s` after that is ignored; `pauses`
     are begin and end of each; `alive_since_s` is since when the screen has looked at its keys without standing still;
-    `gun_silence` is why the gun does not answer, as far as somebody looked.
+    `gun_silence` is why the gun does not answer, as far as somebody looked; `minimised`: the participant's window is,
+    on which they are asked.
     """
 
     plan: Plan
@@ -88,6 +90,7 @@ class Moment:
     pauses: Sequence[tuple[float, float]] = ()
     alive_since_s: float = -math.inf
     gun_silence: str = ""
+    minimised: bool = False
 
     @property
     def trial(self) -> Trial:
@@ -196,7 +199,7 @@ def _fires(event: Event) -> bool:
     return isinstance(event, TO_FIRE) or (isinstance(event, events.Rearm) and event.held_s is None)
 
 
-def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - one case an event
+def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911, PLR0912 - one case an event
     match event:
         case _ if isinstance(event, OWN_HAND_EVENTS):
             return _not_asked(moment, event)
@@ -210,6 +213,8 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - o
             return f"“{response}” is not among the answers."
         case events.Fire() | events.Rearm() if moment.gun_silence:
             return f"See to the gun first: {moment.gun_silence.rstrip('.')}."
+        case events.GoOn() if moment.minimised:
+            return MINIMISED
         case events.Undo() if moment.further_back is None:
             return NOTHING_TO_UNDO
         case events.Undo() if moment.further_back == moment.position.correcting:
@@ -294,7 +299,7 @@ def remark_of(  # noqa: C901, PLR0911 - one case an event
         case events.Pause(cause=cause):
             return remarks.Paused(cause=cause)
         case events.ParticipantBack():
-            return remarks.Noted(trial=None, text="The participant's screen was started again.")
+            return remarks.Noted(trial=None, text=event.how)
         case events.ParticipantLost() if before.paused_s is None and then.paused_s is not None:
             return remarks.Paused(cause=event.cause)
         case events.ParticipantLost():

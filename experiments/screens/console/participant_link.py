@@ -23,6 +23,7 @@ from experiments.screens.texts import kept_text, place_in_session, place_in_set
 from experiments.session import events
 from experiments.session.events import OwnHand, OwnHandEvent
 from experiments.session.history import ranks_of_others
+from experiments.session.judging import MINIMISED
 from experiments.session.remarks import Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Rate, Step
@@ -320,6 +321,8 @@ class ParticipantSide:
                 self._offer(events.EmergencyStop(by="participant"))
             case messages.Focused():
                 self._see()
+            case messages.Minimised():
+                self._minimised(word.on)
             case messages.Draft():
                 self._draft = word
             case messages.NoiseEnded() | messages.NoiseBroken():
@@ -331,17 +334,27 @@ class ParticipantSide:
                 )
                 self._offered(late, None)
             case messages.KeyPressed() if self._live is not None:
-                position, now_s = self._live.position, self._live.clock.now()
-                said = self._said(position)
-                if word.name in said:
-                    key = events.ParticipantKey(response=said[word.name], at_s=now_s, step=position.number)
-                    self._offer(key)
+                self._pressed(word.name, self._live.position, self._live.clock.now())
+
+    def _pressed(self, name: str, position: Position, at_s: float) -> None:
+        """A key of theirs in a pause is on record as refused."""
+        if (said := self._said(position).get(name)) is not None:
+            self._offer(events.ParticipantKey(response=said, at_s=at_s, step=position.number))
+
+    def _minimised(self, on: bool) -> None:
+        """Their window is minimised, or seen again: until it is, the run is paused, where they are asked on it."""
+        if self._live is None or not (self.rates or self.own_keys) or self._live.minimised is on:
+            return
+        self._live.minimised, seen = on, phrase("The participant's window is seen again.")
+        self._offer(events.ParticipantLost(cause=MINIMISED) if on else events.ParticipantBack(how=seen))
+        self._tell(Trouble(text=MINIMISED) if on else Trouble(text=seen, mood="good"))
 
     def _gone(self, cause: str) -> None:
         """The program has ended, and was not told to."""
         if not self._closed:
             self._see()
             if self._live is not None:
+                self._live.minimised = False
                 self.keep_draft(self._live.position)  # their next page begins empty
             self._offer(events.ParticipantLost(cause=cause))
             self._noise_ends(phrase("Masking noise has ended with the participant's screen, and begins again with it."))

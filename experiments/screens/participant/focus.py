@@ -1,4 +1,4 @@
-"""Whose the keys are, and which of them are held.
+"""Whose the keys are, and which of them are held; and whether the window is minimised.
 
 On X a program may say whose the keys are; elsewhere the system decides, and nothing is given back here. The console
 cannot take them back by itself: X and window managers refuse whoever was not worked at last.
@@ -6,13 +6,15 @@ cannot take them back by itself: X and window managers refuse whoever was not wo
 
 from __future__ import annotations
 
-from ctypes import addressof, byref, c_int, c_ulong, string_at
+from ctypes import POINTER, addressof, byref, c_int, c_ubyte, c_ulong, string_at
 from typing import Any
 
 _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""
 _CODES = range(8, 256)
 """The numbers that keys have on X."""
+_ICONIC = 3
+"""What a window manager on X says of a window that is minimised, or lies on another desktop."""
 
 
 class Focus:
@@ -83,6 +85,22 @@ class Focus:
     def here(self) -> bool:
         """Whether the window has the keys now; where there is no X, that is not known."""
         return self._ours is not None and self._holder() == self._ours
+
+    @property
+    def minimised(self) -> bool:
+        """Whether the window is minimised, so that nobody sees it; of a Mac's that is not known."""
+        if not self._on_x:
+            return bool(getattr(self._window, "_hidden", False))
+        xlib, display, said = _xlib(), self._window._x_display, POINTER(c_ubyte)()
+        kind, width, count, left = c_ulong(), c_int(), c_ulong(), c_ulong()
+        name = xlib.XInternAtom(display, b"WM_STATE", 0)
+        of_kind = (byref(kind), byref(width), byref(count), byref(left), byref(said))
+        xlib.XGetWindowProperty(display, self._ours, name, 0, 1, 0, name, *of_kind)
+        if not count.value:  # no window manager says anything
+            return False
+        is_iconic = bool(said[0] == _ICONIC)
+        xlib.XFree(said)
+        return is_iconic
 
     @property
     def _on_x(self) -> bool:

@@ -46,6 +46,7 @@ class ParticipantLink:
         self._page = threading.Lock()
         self.focused: messages.Focused | None = None
         """Whose the keys are, as far as it was said."""
+        self._minimised: messages.Minimised | None = None
         self.noise_ended: messages.NoiseEnded | None = None
         """That the noise has ended, if it has; it may have before anybody listened."""
         self._emergency: messages.EmergencyPressed | None = None
@@ -91,7 +92,7 @@ class ParticipantLink:
     def listen(self, heard: Callable[[messages.Heard], None], gone: Callable[[str], None]) -> None:
         """Have somebody told what is said without a question, or too late, and why the screen is gone if it goes."""
         self._heard, self._gone = heard, gone
-        for word in (self.focused, self.noise_ended, self._emergency):
+        for word in (self.focused, self._minimised, self.noise_ended, self._emergency):
             if word is not None:
                 heard(word)
         if self.failure is not None:
@@ -224,6 +225,7 @@ class ParticipantLink:
             self._beats.put(word.within_s)
         elif isinstance(word, messages.Unasked):
             self.focused = word if isinstance(word, messages.Focused) else self.focused
+            self._minimised = word if isinstance(word, messages.Minimised) else self._minimised
             self.noise_ended = word if isinstance(word, messages.NoiseEnded) else self.noise_ended
             self._emergency = word if isinstance(word, messages.EmergencyPressed) else self._emergency
             self._heard(word)

@@ -219,6 +219,14 @@ class Focused:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Minimised:
+    """Whether this window is minimised, or on another desktop: nobody sees what stands on it."""
+
+    on: bool
+    kind: Literal["minimised"] = "minimised"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class KeyPressed:
     """A key went down that was to be told, while nothing was asked."""
 
@@ -260,7 +268,7 @@ class ScreenFailed:
 
 
 ToParticipant = Show | AskRating | AskDescription | AskChoice | Ping | Noise | CloseScreen
-Unasked = EmergencyPressed | Focused | KeyPressed | Draft | NoiseEnded | NoiseBroken
+Unasked = EmergencyPressed | Focused | Minimised | KeyPressed | Draft | NoiseEnded | NoiseBroken
 """What the participant's screen says without being asked."""
 Heard = Unasked | ChoiceGiven
 """What nobody waits for: also an answer to a question that was called off."""

@@ -115,7 +115,7 @@ class Stage:
         self.drawn_s = 0.0
         """When the page was drawn last; 0 if it was not yet."""
         self._stood: object = None
-        self._closed = False
+        self._closed = self._minimised = False
         self.unasked: deque[messages.Unasked] = deque()
         """What is to be said without a question."""
         self._font_files = [str(path) for path in sorted(toolkit.fonts.glob("NotoSans-*.ttf"))]
@@ -161,6 +161,9 @@ class Stage:
             self.drawn_s, self._stood = now_s, stands
             self.page.draw()
             self.window.flip()
+            if (minimised := self.focus.minimised) is not self._minimised:
+                self._minimised = minimised
+                self.unasked.append(messages.Minimised(on=minimised))
 
     def note_closed(self) -> None:
         """The window's own close button was used."""
