@@ -18,6 +18,7 @@ from experiments.design.plan import Trial
 from experiments.design.stimuli import Stimuli
 from experiments.live_run import Held, LiveRun, RunStopped
 from experiments.record.replay import RunPosition
+from experiments.record.tables import is_simulated
 from experiments.session import events, steps
 from experiments.session.history import trial_at
 from experiments.session.remarks import Refused, TestShot
@@ -304,8 +305,8 @@ class _Runner:
                     raise Unforeseen(other)
 
 
-EMPTY_S = 0.05
-"""So long a gun takes to arm and fire, before it has fired (assumed)."""
+WORDS = 4
+"""So many words to a gun a shot is, armed for it alone (assumed: on its twin 3.5 to 5.6, by the time of one)."""
 LEAD_S = 0.03
 """How long before its tick a shot of a train is asked for; a `next` within that time comes too late for it.
 
@@ -326,7 +327,7 @@ class DeskGun:
 
     def __init__(self, desk: Desk) -> None:
         self._desk, self._live = desk, desk.live
-        self._took_s = EMPTY_S  # the gun's last shot, armed for it alone
+        self._took_s: float | None = None  # the gun's last shot, armed for it alone
 
     def fire(
         self, step: steps.FireShot, not_before_s: float | None = None
@@ -334,8 +335,7 @@ class DeskGun:
         """One shot, armed for it alone; in a catch trial, or an empty interval, nothing is armed and nothing fires."""
         felt = step.trial.with_chosen(step.chosen)
         levels, asked, before = felt.levels_at(step.interval), False, step.interval > 0
-        began_s = self._live.clock.now()
-        shot = None if levels is None else self._desk.stimuli.of_levels(levels)
+        began_s, shot = self._live.clock.now(), None if levels is None else self._desk.stimuli.of_levels(levels)
         try:
             if shot is None:
                 return self._nothing(step, not_before_s)
@@ -355,18 +355,18 @@ class DeskGun:
     def _nothing(self, step: steps.FireShot, not_before_s: float | None) -> steps.Fired:
         """What is felt of no shot, in the time that the last one took. Raises as `allow_shot`."""
         self._live.enter(State.FIRING, step)
-        self._live.sleep(max(not_before_s or 0.0, self._live.clock.now()) + self._took_s)
+        began_s = max(not_before_s or 0.0, self._live.clock.now())
+        self._live.sleep(began_s + (self._will_take_s(step.trial) if self._took_s is None else self._took_s))
         utc, now_s = self._live.clock.utc(), self._live.clock.now()
         self._live.stimulus_begins(now_s)
-        return steps.Fired(
-            gun=self._live.gun_name,
-            onset_utc=utc,
-            requested_s=now_s,
-            pulse_start_s=now_s,
-            pulse_end_s=now_s,
-            home_predicted_s=now_s,
-            motion=steps.NO_MOTION,
-        )
+        return steps.nothing_fired(self._live.gun_name, utc, now_s)
+
+    def _will_take_s(self, trial: Trial) -> float:
+        """How long a first shot is likely to take: words to the gun, and its pulse, for which a real one waits."""
+        asked_s = self._live.clock.now()
+        self._live.gun.status()
+        word_s, simulated = self._live.clock.now() - asked_s, is_simulated(self._live.gun_name)
+        return WORDS * word_s + (0.0 if simulated else self._desk.stimuli.pulse_s(self._shot(trial)))
 
     def present(self, step: steps.Present) -> steps.Presented | steps.Failed | steps.Interrupted:
         """Shots at whole multiples of the interval since the first, until next is said."""

@@ -158,7 +158,7 @@ def sitting(
     name: str, results: Path, troubles: dict[tuple[str, int], BaseException] | None = None, **changes: Any
 ) -> Sitting:
     setup, clock = changes.get("setup") or SETUPS[name], VirtualClock()
-    plan = plan_of(setup.config, "P01", 1)
+    plan = plan_of(setup.config, "P01", changes.get("seed", 1))
     where = place(results, "P01", name)
     storage.make_folder(where.folder)
     journal = Journal.create(where.journal, clock)

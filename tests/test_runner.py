@@ -2,12 +2,13 @@ import csv
 import os
 from collections import Counter
 from contextlib import closing, nullcontext, suppress
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from device import LimitError, LinkError, Shot, ShotReport
+from device import GunStatus, Identity, LimitError, LinkError, Shot, ShotReport
 from experiments.clock import Clock, VirtualClock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -100,6 +101,16 @@ def test_shots_of_a_train_come_at_whole_multiples_of_the_interval(tmp_path: Path
         assert [time - of_train[0] for time in of_train] == pytest.approx(list(range(len(of_train))), abs=1e-6)
 
 
+def times_to_fire(journal: Path) -> list[tuple[bool, float]]:
+    """Of each trial whether it was a catch trial, and how long after the hand-over its stimulus was over."""
+    outcomes = [one for one in raw(journal) if one["kind"] == "outcome"]
+    return [
+        (after["body"]["motion"] == NO_MOTION, after["monotonic_s"] - before["monotonic_s"])
+        for before, after in pairwise(outcomes)
+        if after["body"]["kind"] == "fired"
+    ]
+
+
 def test_a_catch_trial_comes_to_its_question_as_late_as_the_shot_before(tmp_path: Path) -> None:
     class Slow(TroubledGun):
         def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
@@ -111,16 +122,44 @@ def test_a_catch_trial_comes_to_its_question_as_late_as_the_shot_before(tmp_path
     desk = desk._replace(gun=slow)
     desk.screen.gun = slow
     desk.carry_out()
-    outcomes = [one for one in raw(desk.where.journal) if one["kind"] == "outcome"]
-    took = [
-        (after["body"]["motion"] == NO_MOTION, after["monotonic_s"] - before["monotonic_s"])
-        for before, after in pairwise(outcomes)
-        if after["body"]["kind"] == "fired"
-    ]
+    took = times_to_fire(desk.where.journal)
     since = took.index(next(one for one in took if not one[0]))
     assert {of_none for of_none, _ in took[since:]} == {True, False}
     assert [s for _, s in took[since:]] == pytest.approx([took[since][1]] * len(took[since:]), abs=1e-3)
     assert took[since][1] > 0.17
+
+
+@pytest.mark.parametrize(("model", "waits"), [("simulated", False), ("coil", True)])
+def test_a_catch_trial_before_any_shot_takes_as_long_as_a_shot_is_likely_to(
+    tmp_path: Path, model: str, waits: bool
+) -> None:
+    word_s = 0.005
+
+    class Slow(TroubledGun):
+        def identify(self) -> Identity:
+            return replace(super().identify(), model=model)
+
+        def arm(self) -> None:
+            desk.clock.sleep(word_s)
+            super().arm()
+
+        def status(self) -> GunStatus:
+            desk.clock.sleep(word_s)
+            return super().status()
+
+        def fire(self, shot: Shot, at_s: float | None = None) -> ShotReport:
+            desk.clock.sleep(2 * word_s)
+            report = super().fire(shot, at_s)
+            desk.clock.sleep(report.pulse_end_s - report.pulse_start_s if waits else 0.0)
+            return report
+
+    desk = sitting("detection", tmp_path, setup=load_setup("detection"), seed=2)
+    desk = desk._replace(gun=(slow := Slow(desk.setup, desk.clock, {})))
+    desk.screen.gun = slow
+    desk.carry_out()
+    took = times_to_fire(desk.where.journal)
+    assert took[0][0]
+    assert took[0][1] == pytest.approx(next(s for of_none, s in took if not of_none), abs=0.003)
 
 
 def test_a_virtual_run_takes_the_planned_time(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import cast
 
-from device.methods import Method, drive_of
+from device.methods import Method, drive_of, rendering_of
 from device.parameters import VibrationParameters
 from device.words import Direction, Drive, LimitError, Shot
 from experiments.config.door import ConfigError
@@ -88,6 +88,11 @@ class Stimuli:
         for trial in (trial for trial in trials if not trial.track):
             for place in range(max(1, len(trial.intervals))):
                 self.shot(trial, place)
+
+    def pulse_s(self, shot: Shot) -> float:
+        """How long a shot's pulse is, or its vibration."""
+        rendering = rendering_of(self.methods[shot.method], shot.drive)
+        return rendering.load.on_s or rendering.settle_s
 
     def first_shot(self, trials: Iterable[Trial]) -> Shot:
         """The first shot that is felt in some trials; a track's is at the last levels, before any is chosen."""

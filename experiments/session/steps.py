@@ -337,6 +337,19 @@ def asks_at_once(step: Step | None) -> bool:
     return isinstance(step, Asking) and not step.later
 
 
+def nothing_fired(gun: str, onset_utc: str, at_s: float) -> Fired:
+    """What is said of an interval, or a catch trial, in which nothing is fired."""
+    return Fired(
+        gun=gun,
+        onset_utc=onset_utc,
+        requested_s=at_s,
+        pulse_start_s=at_s,
+        pulse_end_s=at_s,
+        home_predicted_s=at_s,
+        motion=NO_MOTION,
+    )
+
+
 def is_begun(step: Step | None) -> bool:
     """Whether a trial was felt, or a part of it, when this step is due: if that breaks off, it is presented again."""
     return (isinstance(step, Prepare | FireShot) and step.interval > 0) or asks_at_once(step)
