@@ -14,8 +14,17 @@ import pytest
 
 from experiments.session.judging import STOOD_STILL
 from experiments.session.states import State
-from tests.at_display import HAND_S, AtConsole, needs_display, remarks, virtual_display
+from tests.at_display import (
+    HAND_S,
+    AtConsole,
+    check_disarmed,
+    needs_display,
+    remarks,
+    run_words,
+    virtual_display,
+)
 from tests.at_hand import ACTIONS, HELD_S, Cell, check_cell, check_gun, check_in_one_run, check_participants_keys
+from tests.at_runs import RUN
 from tests.journals import raw
 from tests.pseudo_languages import RIGHT_TO_LEFT, write_pseudo_languages
 from tests.waiting import wait_for
@@ -46,6 +55,20 @@ def test_accidents_of_the_hand_do_what_the_table_says(tmp_path: Path, display: s
         (S.PREPARING, "Tab Tab Space"),
         (S.HALTED, "double Space"),
     )
+
+
+def test_no_menu_of_a_field_keeps_f12_from_being_heard_in_a_train(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with AtConsole(run_words(quick_configs, "preference"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.keys.press("n")
+        screen.until(lambda look: look.line)
+        screen.keys.press("Menu")
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted")
+        check_disarmed(screen.watch)
 
 
 @pytest.mark.parametrize("action", ["F12", "P"])

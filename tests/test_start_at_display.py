@@ -296,6 +296,18 @@ def wait_until(happened: Callable[[], bool], timeout_s: float = 60) -> None:
 # hands
 
 
+@pytest.mark.parametrize("keys", [["Menu"], ["Tab", "Tab", "space"]], ids=["menu of a field", "list"])
+def test_f12_is_heard_where_a_menu_or_a_list_would_take_every_key(pilot: Path, display: str, keys: list[str]) -> None:
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        for key in keys:
+            screen.keys.press(key)
+        time.sleep(HAND_S)
+        screen.keys.press("F12")
+        wait_for(eye, having("F12 is heard. Nothing is armed here"))
+        screen.kill()
+
+
 def test_a_key_that_is_held_tests_one_method(pilot: Path, display: str) -> None:
     with started(pilot, display) as (screen, eye):
         wait_for(eye, having("Next: P01"))
