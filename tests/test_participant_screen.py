@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import time
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -9,7 +10,16 @@ from dataclasses import replace
 import pytest
 
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
-from experiments.screens.participant.messages import Look
+from experiments.screens.participant.messages import (
+    CloseScreen,
+    Look,
+    Noise,
+    NoiseIs,
+    Ready,
+    arguments,
+    from_participant_from,
+    line,
+)
 from experiments.screens.xkeys import Hands as XHands
 from tests.at_participant import (
     BUTTON_Y,
@@ -18,6 +28,7 @@ from tests.at_participant import (
     HINT,
     LEFT_END,
     LINE_Y,
+    LOOK,
     OFF_LINE_Y,
     RIGHT_END,
     SCALE,
@@ -34,6 +45,7 @@ from tests.at_participant import (
     started,
 )
 from tests.waiting import PATIENCE_S, stand_still, wait_for
+from tests.warm_start import warm
 
 REPEATED_S = 1.2
 """After so long X has repeated a key that is held: it begins after 0.66 s if nobody sets that."""
@@ -349,6 +361,41 @@ def test_without_a_sound_device_the_noise_stays_off_with_one_clear_message(link)
     assert noise.message.startswith("Masking noise stays off: no sound device")
     assert "\n" not in noise.message
     assert link.noise(on=False).message == ""
+
+
+def test_the_program_ends_by_itself_though_its_sound_device_stands_still(display, tmp_path):
+    sink, pid = tmp_path / "sink", tmp_path / "pid"
+    sink.write_text(f"#!/bin/sh\necho $$ > {pid}\nexec cat > /dev/null\n")
+    sink.chmod(0o700)
+    (tmp_path / ".asoundrc").write_text(
+        f'pcm.!default {{ type file slave.pcm {{ type null }} file "|exec {sink}" format raw }}\n'
+    )
+    program = subprocess.Popen(
+        warm("-m", "experiments.screens.participant", *arguments(LOOK)),
+        env=os.environ | {"DISPLAY": display, "HOME": str(tmp_path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    said = (from_participant_from(line) for line in program.stdout)
+    try:
+        next(word for word in said if isinstance(word, Ready))
+        program.stdin.write(line(Noise(on=True)))
+        program.stdin.flush()
+        noise = next(word for word in said if isinstance(word, NoiseIs))
+        if not noise.on:
+            pytest.skip("the sound library does not take its devices from ALSA")
+        wait_for(lambda: pid.exists() and pid.read_text().endswith("\n"))
+        os.kill(int(pid.read_text()), signal.SIGSTOP)
+        time.sleep(FAR_S)  # until the pipe to it is full, and the stream waits
+        program.stdin.write(line(CloseScreen()))
+        program.stdin.close()
+        assert program.wait(PATIENCE_S) == 0
+    finally:
+        program.kill()
+        program.stdout.close()
+        program.wait()
+        if pid.exists():
+            os.kill(int(pid.read_text()), signal.SIGKILL)
 
 
 def test_a_question_that_is_called_off_leaves_the_screen_ready_for_the_next(ask, hands, link):

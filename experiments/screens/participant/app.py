@@ -147,8 +147,7 @@ class App:
             self._answer()
             self._answer_late()
             time.sleep(_STEP_S)
-        self._noise.stop()
-        self._stage.close()
+        self._stage.close()  # the noise ends with the program: to close its stream may wait for a device for ever
 
     def _tell_keys(self) -> None:
         """Say which of the keys to be told went down since the last look."""
