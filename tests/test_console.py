@@ -132,6 +132,19 @@ def test_what_stops_does_so_as_its_button_goes_down(
         assert screen.look().state == state
 
 
+def test_a_train_does_not_go_on_while_it_is_typed_why_it_stops(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with AtConsole(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        screen.keys.press("q")
+        screen.until(lambda look: look.state == "paused" and look.line)
+        screen.keys.type("enough")
+        screen.keys.press("Return")
+        assert screen.close()[0] == 130
+
+
 @pytest.mark.parametrize("practises", [True, False], ids=["practice", "run"])
 def test_after_an_emergency_stop_in_a_practice_the_next_one_and_the_run_begin_with_a_test_shot(
     quick_configs: Path, tmp_path: Path, display: str, practises: bool

@@ -216,7 +216,7 @@ class Controls:
     def _run(self, name: keys.Name, press: Press) -> None:
         self.uncover()
         if name in LINE_QUESTIONS:
-            self._ask_for(name)
+            self.ask_why_it_stops() if name == "stop" else self._ask_for(name)
         elif name in keys.ANSWERS:
             self._choose(keys.ANSWERS.index(name), press)
         elif name == "no answer":
@@ -367,7 +367,7 @@ class Controls:
             self._view.open_line(phrase("{question}  (Enter saves, Esc leaves it)", question=question))
 
     def ask_why_it_stops(self) -> None:
-        """Somebody wants to close the window of a live run: a gun that may fire is disarmed first."""
+        """Somebody wants to end a live run, or close its window: a gun that may fire is disarmed first."""
         if self._live.position.base in ARMED:
             self._offer(events.Pause())
         self._ask_for("stop")

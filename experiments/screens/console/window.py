@@ -79,9 +79,8 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._brief_for = -1
         self._lasting, self._failure = ("", "good"), ""
         self._beside: view.Trouble | None = None
-        self._takes_keys = False
         self.theme: Theme = "dark"
-        self._scale = 0.0
+        self._takes_keys, self._scale = False, 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
         NoMenus(self)
