@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from experiments.earlier_run import owes_shot
 from experiments.live_run import CORRECTION_UNSAVED, EventVerdict, RunStopped
 from experiments.record import storage
 from experiments.record.journal import JournalError
-from experiments.record.owed_shot import OwedShot, owe_shot
+from experiments.record.owed_shot import OWED_FILE, OwedShot, owe_shot
 from experiments.record.replay import history
 from experiments.screens.console.typed_lines import LINE_QUESTIONS, line_question
 from experiments.screens.texts import again_text
@@ -1313,6 +1314,20 @@ def test_a_run_pays_the_test_shot_that_one_beside_all_runs_left_owed(
         assert sitting.position.base in (S.SETTING, S.PREPARING)
     assert owes_shot(tmp_path, "serial:/dev/7") is not (gun == "7" and by_name)  # that was paid
     assert owes_shot(tmp_path, "serial:/dev/8")
+
+
+def test_what_nobody_can_read_each_gun_owes_until_a_run_of_its_own_paid_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / OWED_FILE).write_bytes(b"[" * 100_000)
+    os.utime(tmp_path / OWED_FILE, (0.0, 0.0))  # long before the run's own clock
+    for code, serial, owed in (("P02", "7", True), ("P03", "7", False), ("P04", "8", True)):
+        identity = Identity(model="shaker", version="2", serial=serial)
+        monkeypatch.setattr(WatchedGun, "identify", lambda _, found=identity: found, raising=False)
+        with sat(DIRECTION, tmp_path) as sitting:
+            assert (sitting.state is S.REARMING) is owed
+            sitting.to(S.PREPARING)
+        (tmp_path / "sub-P01").rename(tmp_path / f"sub-{code}")
 
 
 def test_a_gun_owes_its_test_shot_until_that_is_fired_on_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

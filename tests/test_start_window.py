@@ -9,6 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import lru_cache
@@ -1226,6 +1227,19 @@ def test_a_file_of_owed_test_shots_that_nobody_can_read_owes_one(
     assert opened().shots.owed
     shot_was_fired(study.results, "shaker:7", SERIAL)
     assert not owed_shots(study.results)
+
+
+def test_no_debt_is_lost_where_two_windows_write_them_at_once(study: StudyFolder) -> None:
+    study.results.mkdir(exist_ok=True)
+
+    def owe(window: int) -> None:
+        for number in range(20):
+            gun = f"shaker:{window}-{number}"
+            owe_shot(study.results, OwedShot(utc="2026-01-01T00:00:00.000000Z", gun=gun, address=SERIAL))
+
+    with ThreadPoolExecutor(2) as windows:
+        list(windows.map(owe, range(2)))
+    assert len(owed_shots(study.results)) == 40
 
 
 def test_a_test_shot_pays_what_its_own_gun_owes(study: StudyFolder) -> None:

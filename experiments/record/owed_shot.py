@@ -12,8 +12,10 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
+from experiments.clock import utc_text
 from experiments.record import storage
 from experiments.record.journal import JournalError
 
@@ -30,8 +32,8 @@ class OwedShot:
 
 
 _ELSEWHERE = "another address"
-_UNREAD = OwedShot(utc="9999", gun="", address="")
-"""A line that says nothing: whose it is nobody knows, so every gun owes it."""
+_PATIENCE_S = 1.0
+"""So long another window that changes the file is waited for."""
 
 
 RETRY_S = 1.0
@@ -81,7 +83,7 @@ class DebtKeeper:
 def owe_shot(results: Path, owed: OwedShot) -> None:
     """Have it on the disk. `OSError`, if that does not take it."""
     storage.make_folder(results)
-    _write(results, [*_owed_shots(results), owed])
+    _change(results, lambda before: [*before, owed])
 
 
 def owed_shots(results: Path) -> list[OwedShot]:
@@ -97,19 +99,22 @@ def owed_shots(results: Path) -> list[OwedShot]:
 
 
 def _owed_shots(results: Path) -> list[OwedShot]:
+    path = results / OWED_FILE
     try:
-        data = storage.read_whole(results / OWED_FILE)
+        data, written_s = storage.read_whole(path), path.stat().st_mtime
     except (FileNotFoundError, NotADirectoryError):
         return []
-    return [_of_line(line) for line in data.splitlines() or [data]]
+    unread = OwedShot(utc=utc_text(datetime.fromtimestamp(written_s, UTC)), gun="", address="")
+    return [_of_line(line, unread) for line in data.splitlines() or [data]]
 
 
-def _of_line(line: bytes) -> OwedShot:
+def _of_line(line: bytes, unread: OwedShot) -> OwedShot:
+    """What a line says; of one that says nothing nobody knows whose it is: every gun owes it since it was written."""
     try:
         values = json.loads(line)
         return OwedShot(**{name: str(value) for name, value in values.items()})
-    except (ValueError, TypeError, AttributeError):
-        return _UNREAD
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return unread
 
 
 def shot_was_fired(results: Path, gun: str, address: str) -> None:
@@ -117,22 +122,27 @@ def shot_was_fired(results: Path, gun: str, address: str) -> None:
 
     What another gun owes that was at its address, it owes wherever it is now.
     """
-    others = [
-        replace(one, address=_ELSEWHERE) if one.address == address else one
-        for one in _owed_shots(results)
-        if one.gun not in ("", gun) or (not one.gun and one.address not in ("", address))
-    ]
-    _write(results, others)
+
+    def others(before: list[OwedShot]) -> list[OwedShot]:
+        return [
+            replace(one, address=_ELSEWHERE) if one.address == address else one
+            for one in before
+            if one.gun not in ("", gun) or (not one.gun and one.address not in ("", address))
+        ]
+
+    _change(results, others)
 
 
 def take_back(results: Path, owed: OwedShot) -> None:
     """It is owed no more: the gun is a simulated one. `OSError`, if the disk does not take that."""
-    _write(results, [one for one in _owed_shots(results) if one != owed])
+    _change(results, lambda before: [one for one in before if one != owed])
 
 
-def _write(results: Path, owed: list[OwedShot]) -> None:
-    lines = [json.dumps(asdict(one), ensure_ascii=False) for one in owed]
-    if lines:
-        storage.write_whole(results / OWED_FILE, "".join(f"{line}\n" for line in lines).encode())
-    else:
-        (results / OWED_FILE).unlink(missing_ok=True)
+def _change(results: Path, change: Callable[[list[OwedShot]], list[OwedShot]]) -> None:
+    """Write what becomes of what is owed, with nobody else between; who holds the folder for long is not waited for."""
+    with storage.folder_held(results, _PATIENCE_S):
+        lines = [json.dumps(asdict(one), ensure_ascii=False) for one in change(_owed_shots(results))]
+        if lines:
+            storage.write_whole(results / OWED_FILE, "".join(f"{line}\n" for line in lines).encode())
+        else:
+            (results / OWED_FILE).unlink(missing_ok=True)
