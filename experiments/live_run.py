@@ -299,12 +299,14 @@ class LiveRun:
         """As `allow_shot`; false, for a moment, while what was pressed in a standstill is still to come.
 
         It pauses if the program stood still for long since the key to fire: nobody expects a shot any more; and if it
-        looks at its keys so seldom that nothing could be fired.
+        looks at its keys so seldom that nothing could be fired, or another window has them.
         """
         if self.beats.alive_since_s > self._to_fire_s:
             self.offer(events.Pause(cause=judging.STOOD_STILL))
         elif self.beats.hears_late:
             self.offer(events.Pause(cause=judging.HEARS_LATE))
+        elif self.beats.is_deaf:
+            self.offer(events.Pause(cause=judging.KEYS_ELSEWHERE))
         self.allow_shot()
         return self.beats.prompt
 

@@ -12,7 +12,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.at_display import HAND_S, AtConsole, AtDisplay, needs_display, records, remarks, virtual_display
+from tests.at_display import (
+    HAND_S,
+    OTHER,
+    AtConsole,
+    AtDisplay,
+    another_window,
+    needs_display,
+    records,
+    remarks,
+    virtual_display,
+)
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, SHORT_TRIALS, answers, rows, shorten, words
 from tests.warm_start import warm
 from tests.watched_console import Watch
@@ -130,6 +140,21 @@ def test_what_stops_does_so_as_its_button_goes_down(
             screen.until(lambda look: look.state == state)
         time.sleep(HAND_S)
         assert screen.look().state == state
+
+
+def test_a_train_does_not_go_on_while_another_window_has_the_keys(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with AtConsole(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        with another_window(display):
+            screen.keys.focus_on(OTHER)
+            screen.until(lambda look: look.state == "paused")
+        screen.stands(RUN)
+        assert screen.look().says("Another window had the keys")
+        screen.keys.press("p")
+        screen.until(lambda look: look.state != "paused")
 
 
 def test_a_train_does_not_go_on_while_it_is_typed_why_it_stops(

@@ -29,7 +29,14 @@ from experiments.session import events
 from experiments.session import remarks as words
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
-from experiments.session.judging import HEARS_LATE, MINIMISED, NOTHING_TO_UNDO, STANDSTILL_S, STOOD_STILL
+from experiments.session.judging import (
+    HEARS_LATE,
+    KEYS_ELSEWHERE,
+    MINIMISED,
+    NOTHING_TO_UNDO,
+    STANDSTILL_S,
+    STOOD_STILL,
+)
 from experiments.session.remarks import (
     HALTED_BEFORE,
     EntryCorrected,
@@ -240,6 +247,24 @@ def test_on_a_computer_too_busy_to_hear_a_stop_nothing_fires_and_the_run_says_wh
             assert by_hand(sitting, event)
         assert sitting.gun.words.count("rendered") == 1
         assert [one.cause for one in remarks(of_journal(sitting), Paused)] == [HEARS_LATE]
+
+
+@pytest.mark.parametrize(("away_s", "goes_on"), [(0.4, True), (3.0, False)])
+def test_a_train_fires_nothing_while_the_keys_are_elsewhere(away_s: float, goes_on: bool, tmp_path: Path) -> None:
+    """They pass from window to window in less than half a second."""
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        looks(sitting, 3)
+        fired = sitting.gun.words.count("rendered")
+        for _ in range(round(away_s / 0.1)):
+            sitting.live.beats.beat(heard=False)
+            sitting.clock.skip(0.1)
+            sitting.settle()
+        looks(sitting, 0 if not goes_on else 12)
+        sitting.settle()
+        assert (S.PAUSED in sitting.position.states) is not goes_on
+        assert goes_on or sitting.position.why == KEYS_ELSEWHERE
+        assert goes_on or sitting.gun.words[-1] == "disarmed"
+        assert sitting.gun.words.count("rendered") == fired + goes_on
 
 
 @pytest.mark.parametrize("state", [S.PREPARING, S.REARMING])

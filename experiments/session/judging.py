@@ -20,6 +20,7 @@ REARM_HELD_S = 1.0
 STOOD_STILL = "the program stood still for more than 1 s, and nothing was fired after it: look where the gun is"
 HEARS_LATE = "this computer is too busy to hear a stop in time, so nothing fires: close what else runs on it"
 HALTED_PRACTICE = "After the emergency stop nothing fires in this practice: close it, then do it again."
+KEYS_ELSEWHERE = "another window had the keys, where F12 is not heard: click here, and keep it in front"
 MINIMISED = "The participant's window is minimised, and they see nothing: bring it back first."
 NOTHING_TO_UNDO = "There is nothing to undo in this set."
 NOTHING_TO_REPEAT = "There is no trial of this set to repeat now."
@@ -29,6 +30,8 @@ _SETTLED = 3
 """So many beats in time after that, and what was pressed meanwhile has come."""
 _PROMPT_S = 0.3
 """Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
+DEAF_S = 0.5
+"""Nor while another window has the keys for so long; they pass from window to window in less (assumed)."""
 _LATE_S = 3.0
 """Nor does anything if that goes on for so long, and the experimenter is told (assumed)."""
 
@@ -42,11 +45,15 @@ class Beats:
     def __init__(self, now: Callable[[], float]) -> None:
         self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
         self._lately: tuple[float, ...] = ()
-        self._late_s = math.inf
+        self._late_s = self._deaf_s = math.inf
 
-    def beat(self) -> None:
-        """The timer beats. The time is read once: wherever this itself stands still, the next beat is late."""
+    def beat(self, *, heard: bool = True) -> None:
+        """The timer beats; `heard`: what is pressed comes here.
+
+        The time is read once: wherever this itself stands still, the next beat is late.
+        """
         now_s = self._now()
+        self._deaf_s = math.inf if heard else min(self._deaf_s, now_s)
         self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
         self._last_s = now_s
         self._lately = (*self._lately[-_SETTLED:], now_s)
@@ -63,6 +70,11 @@ class Beats:
     def hears_late(self) -> bool:
         """Whether that was not so for a while, without a standstill."""
         return self._now() - self._late_s > _LATE_S
+
+    @property
+    def is_deaf(self) -> bool:
+        """Whether what is pressed has gone elsewhere for a while."""
+        return self._now() - self._deaf_s > DEAF_S
 
     @property
     def alive_since_s(self) -> float:

@@ -10,7 +10,7 @@ from device import GunStatus
 from experiments.design.plan import Trial
 from experiments.design.stimuli import settings
 from experiments.screens import texts
-from experiments.screens.console.view import About, GunSeen, Seen
+from experiments.screens.console.view import About, GunSeen, ParticipantSeen, Seen
 from experiments.screens.phrases import phrase
 from experiments.session import steps
 from experiments.session.duration import break_s
@@ -207,11 +207,16 @@ def focus_text(seen: Seen, *, here: bool) -> tuple[str, str]:
     return phrase("{keys}\nMasking noise: OFF", keys=text), "bad"
 
 
+def are_keys_heard(participant: ParticipantSeen | None, *, here: bool) -> bool:
+    """Whether F12 is heard wherever the keys are: in this window, or in the participant's."""
+    return here or (participant is not None and participant.focused)
+
+
 def _keys_text(seen: Seen, *, here: bool) -> tuple[str, str]:
     """Empty where nothing else could have them."""
     if here:
         return (phrase("Keys: this window"), "good") if seen.participant is not None else ("", "good")
-    if seen.participant is not None and seen.participant.focused:
+    if are_keys_heard(seen.participant, here=here):
         return phrase("Keys: the participant's screen (F12 works there)"), "wait"
     return phrase("Keys: ANOTHER WINDOW – click here"), "bad"
 

@@ -21,7 +21,7 @@ from experiments.screens.console.instructions import instruction
 from experiments.screens.console.keys import BY_NAME, Name, Typing, own_arrows
 from experiments.screens.console.over_all import NoMenus
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
-from experiments.screens.console.progress import marks
+from experiments.screens.console.progress import are_keys_heard, marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.phrases import phrase
@@ -281,7 +281,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _beat(self) -> None:
         if self.live is not None:
-            self.live.beats.beat()
+            self.live.beats.beat(heard=are_keys_heard(self.participant, here=self.isActiveWindow()))
         self.refresh()
 
     def refresh(self) -> None:
