@@ -105,9 +105,11 @@ def refuse_gone(results: Path, had: Collection[Path], participant_id: str) -> No
             "quit, and start Recoil again, to begin with nobody"
         )
     for lost in (path for path in own if path in gone):
+        lacks, anew = f"{participant_id} would begin as somebody new", "if they are to"
+        if lost.name == register.REGISTER_FILE:
+            lacks, anew = "nothing else says who joined, and who is excluded", "to begin a new one"
         raise PlaceError(
-            f"{lost.resolve()}: was there, and is gone: {participant_id} would begin as somebody new. Put it back; or "
-            "quit, and start Recoil again, if they are to"
+            f"{lost.resolve()}: was there, and is gone: {lacks}. Put it back; or quit, and start Recoil again, {anew}"
         )
 
 

@@ -101,9 +101,9 @@ class ShotCheck:
         try:
             text, mood = self._with_gun()
         except (DeviceError, ValueError) as error:
-            text = phrase("Test shot of {label}: {error}", label=self._label, error=error)
+            text = phrase("Test shot of {label}: {error}.", label=self._label, error=error)
             if self._latched.is_set():
-                text = f"{text}. {state_text(None)[0]}"
+                text = f"{text} {state_text(None)[0]}"
         finally:
             self._tell(ShotProgress(phase="over", fired=self._report is not None, text=text, mood=mood))
 
