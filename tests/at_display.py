@@ -29,6 +29,8 @@ HAND_S = 1.5 * BOUNCE_S
 """A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
 OTHER = "another program's window"
 _RIGHT_BUTTON = 3
+_NO_DOUBLE_S = 0.6
+"""Two clicks that far apart are none double."""
 BUSY = ("saving", "firing", "stopped")
 """States in which nobody is waited for."""
 
@@ -134,6 +136,27 @@ class AtDisplay:
             for event in (X.ButtonPress, X.ButtonRelease):
                 xtest.fake_input(display, event, _RIGHT_BUTTON)
             display.sync()
+
+    @contextmanager
+    def dragging(self, x: int, y: int) -> Iterator[None]:
+        """Meanwhile the word at a place of the screen is chosen, and dragged if that can be done."""
+        from Xlib import X
+        from Xlib.ext import xtest
+
+        display = self.keys.display
+        xtest.fake_input(display, X.MotionNotify, x=x, y=y)
+        for event in (X.ButtonPress, X.ButtonRelease, X.ButtonPress, X.ButtonRelease):
+            xtest.fake_input(display, event, 1)
+        display.sync()
+        time.sleep(_NO_DOUBLE_S)
+        xtest.fake_input(display, X.ButtonPress, 1)
+        for step in range(1, 40, 4):
+            xtest.fake_input(display, X.MotionNotify, x=x + step, y=y + step)
+            display.sync()
+            time.sleep(HAND_S / 5)
+        yield
+        xtest.fake_input(display, X.ButtonRelease, 1)
+        display.sync()
 
     def kill(self) -> str:
         """`kill -9`; what was said until then."""

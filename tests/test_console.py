@@ -31,6 +31,8 @@ pytest.importorskip("PyQt6")
 pytestmark = [needs_display, pytest.mark.slow]
 
 START = "Recoil – start"
+WORD_OF_HELP = (35, 136)
+"""“Space” in the list of keys."""
 NOTE_LINE = (300, 610)
 """Where a note is typed, on a screen of 1280x800."""
 
@@ -127,6 +129,17 @@ def test_no_menu_takes_the_keys_of_a_run(quick_configs: Path, tmp_path: Path, di
         screen.at("halted")
         screen.keys.press("q")
         screen.close()
+
+
+def test_no_text_that_is_dragged_takes_the_keys_of_a_run(quick_configs: Path, tmp_path: Path, display: str) -> None:
+    with AtConsole(words(quick_configs, "direction", "--participant", "P01"), tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("asking")
+        screen.keys.press("F1")
+        time.sleep(HAND_S)
+        with screen.dragging(*WORD_OF_HELP):
+            screen.keys.press("F12")
+            screen.at("halted")
 
 
 @pytest.mark.parametrize(("name", "state"), [("emergency", "halted"), ("pause", "paused")])

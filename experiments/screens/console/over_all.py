@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Callable
+from contextlib import suppress
+from weakref import WeakSet
 
 from PyQt6 import QtCore
 from PyQt6.QtGui import QKeyEvent
-from PyQt6.QtWidgets import QApplication, QWidget
+from PyQt6.QtWidgets import QApplication, QPlainTextEdit, QTextEdit, QWidget
 
 from experiments.screens.console.windows import key_name
+
+_made: WeakSet[_OverAll] = WeakSet()
+
+
+@atexit.register
+def _end_all() -> None:
+    """Before Qt goes: it would ask what is gone already, and crash. A run may end with its window there."""
+    for one in _made:
+        with suppress(RuntimeError):  # Qt has deleted it
+            one.end()
 
 
 class _OverAll(QtCore.QObject):
@@ -18,6 +31,13 @@ class _OverAll(QtCore.QObject):
         super().__init__(window)
         self._window, self._shown = window, False
         window.installEventFilter(self)
+        _made.add(self)
+
+    def end(self) -> None:
+        """See nothing more."""
+        self._window.removeEventFilter(self)
+        if (app := QApplication.instance()) is not None:
+            app.removeEventFilter(self)
 
     def eventFilter(self, watched: QtCore.QObject | None, event: QtCore.QEvent | None) -> bool:  # noqa: N802 - Qt's name
         """Begin and end with the window, of which nothing is left behind that; true keeps an event to itself."""
@@ -62,10 +82,22 @@ class AnyHeld(_OverAll):
         return True
 
 
-class NoMenus(_OverAll):
-    """Keeps menus shut while a page is shown: an open one takes the first click, also one on EMERGENCY STOP."""
+class KeepsKeys(_OverAll):
+    """Keeps menus shut, and text from being dragged, while a page is shown: both take every key for themselves.
+
+    A menu takes the first click as well, also one on EMERGENCY STOP.
+    """
 
     def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
-        """Take what asks for a menu."""
-        asks = event.type() == QtCore.QEvent.Type.ContextMenu
-        return asks and isinstance(watched, QWidget) and watched.window() is self._window.window()
+        """Take what asks for a menu, and a press on text that is only read."""
+        kind = event.type()
+        if kind not in _OPENING or not isinstance(watched, QWidget) or watched.window() is not self._window.window():
+            return False
+        return kind == QtCore.QEvent.Type.ContextMenu or isinstance(watched.parent(), QTextEdit | QPlainTextEdit)
+
+
+_OPENING = {
+    QtCore.QEvent.Type.ContextMenu,
+    QtCore.QEvent.Type.MouseButtonPress,
+    QtCore.QEvent.Type.MouseButtonDblClick,
+}

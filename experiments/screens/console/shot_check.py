@@ -29,13 +29,13 @@ from experiments.record.owed_shot import OWED_FILE, DebtKeeper, OwedShot, owe_sh
 from experiments.record.tables import is_simulated
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
-from experiments.screens.console.over_all import NoMenus
+from experiments.screens.console.over_all import KeepsKeys
 from experiments.screens.console.widgets import TextLines
 from experiments.screens.phrases import phrase
 from experiments.session.judging import STANDSTILL_S, Beats
 
 COUNTDOWN_S = 3
-STOOD_STILL = phrase("The console stood still in the countdown: nothing was fired.")
+HUNG = phrase("The console stood still in the countdown: nothing was fired.")
 _BEAT_MS, _LOOK_S = 100, 0.02
 SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
@@ -134,11 +134,11 @@ class ShotCheck:
             if self._off.wait(1.0):
                 break
             if self._clock.now() - told_s > 1.0 + STANDSTILL_S:  # what was pressed meanwhile is not heard yet
-                return STOOD_STILL
+                return HUNG
         if not self._off.is_set():
             self._report = self._armed_shot(gun, drive, began_s)
             if self._report is None and not self._off.is_set():
-                return STOOD_STILL
+                return HUNG
         return phrase("Nothing was fired.") if self._report is None else report_text(self._label, self._report, drive)
 
     def _armed_shot(self, gun: Gun, drive: Drive, began_s: float) -> ShotReport | None:
@@ -268,7 +268,7 @@ class ShotPage(QWidget):
         kept = self.next_button.sizePolicy()
         kept.setRetainSizeWhenHidden(True)
         self.next_button.setSizePolicy(kept)
-        NoMenus(self)
+        KeepsKeys(self)
 
     @property
     def owed_text(self) -> str:

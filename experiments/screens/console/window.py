@@ -19,7 +19,7 @@ from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.instructions import instruction
 from experiments.screens.console.keys import BY_NAME, Name, Typing, own_arrows
-from experiments.screens.console.over_all import NoMenus
+from experiments.screens.console.over_all import KeepsKeys
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import are_keys_heard, marks
 from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
@@ -83,7 +83,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._takes_keys, self._scale = False, 0.0
         self._build()
         self._keyboard = Keyboard(self, clock.now)
-        NoMenus(self)
+        KeepsKeys(self)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._beat)
         self._timer.start(REFRESH_MS)
