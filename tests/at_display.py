@@ -147,7 +147,8 @@ class AtDisplay:
         xtest.fake_input(display, X.MotionNotify, x=x, y=y)
         for event in (X.ButtonPress, X.ButtonRelease, X.ButtonPress, X.ButtonRelease):
             xtest.fake_input(display, event, 1)
-        display.sync()
+            display.sync()
+            time.sleep(HAND_S / 2)
         time.sleep(_NO_DOUBLE_S)
         xtest.fake_input(display, X.ButtonPress, 1)
         for step in range(1, 40, 4):
