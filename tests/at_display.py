@@ -307,6 +307,17 @@ class AtConsole(AtDisplay):
         finally:
             self.keys.key_up(key)
 
+    def off_and_back(self, name: str) -> None:
+        """The pointer leaves a command's button, and comes back."""
+        from Xlib import X
+        from Xlib.ext import xtest
+
+        x, y = middle(self.look(), name)
+        for above_px in (120, 0):
+            xtest.fake_input(self.keys.display, X.MotionNotify, x=x, y=y - above_px)
+            self.keys.display.sync()
+            time.sleep(HAND_S)
+
     @contextmanager
     def standing_still(self, seconds: float) -> Iterator[None]:
         """The program stands still while something is done, and after it for so long."""

@@ -1104,6 +1104,25 @@ def test_a_button_that_stops_a_test_shot_does_so_as_it_goes_down(opened: Open, n
     assert window.pages.currentWidget() is window.shots
 
 
+def test_a_double_click_on_back_presses_nothing_on_the_page_beneath(opened: Open) -> None:
+    window = opened(gun="simulated")
+    fill(window, "P01")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, "Escape")
+    until(lambda: not window.shots.is_running)
+    back = window.shots.call_off_button
+    for spot in (back.rect().center(), QPoint(10, back.height() // 2), QPoint(back.width() - 10, back.height() // 2)):
+        window.pages.setCurrentWidget(window.shots)
+        at = back.mapTo(window, spot)
+        QTest.mouseClick(back, Qt.MouseButton.LeftButton, pos=spot)
+        assert window.pages.currentWidget() is not window.shots
+        beneath = window.childAt(at)
+        QTest.mouseDClick(beneath, Qt.MouseButton.LeftButton, pos=beneath.mapFrom(window, at), delay=1)
+        assert window.choice is None
+        assert not question(window)
+
+
 def test_a_stop_was_heard_though_another_window_had_the_keys_behind_it(opened: Open) -> None:
     window = opened(gun="simulated")
     key(window, "T", CTRL)

@@ -37,7 +37,7 @@ _AT_ONCE: frozenset[Name] = frozenset(["emergency", "pause"])
 """What stops does so as its button goes down."""
 
 
-class CommandButton(widgets.AtOnce):
+class CommandButton(widgets.Button):
     """A button of a command. It never takes the keys."""
 
     def __init__(self, name: Name, mouse: Mouse, style: str = "") -> None:
@@ -47,12 +47,12 @@ class CommandButton(widgets.AtOnce):
         self.setAccessibleName(BY_NAME[name].text)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setSizePolicy(QtWidgets.QSizePolicy.Policy.Ignored, QtWidgets.QSizePolicy.Policy.Preferred)
-        self.pressed.connect(self._keep)
+        self.went_down.connect(self._keep)
         if name == "rearm":  # it has to be held
-            self.pressed.connect(lambda: mouse.hold(self._press))
+            self.went_down.connect(lambda: mouse.hold(self._press))
             self.released.connect(mouse.let_go)
         elif name in _AT_ONCE:
-            self.pressed.connect(lambda: mouse.do(self.name, self._press))
+            self.went_down.connect(lambda: mouse.do(name, self._press))
         else:
             self.clicked.connect(lambda _: mouse.do(self.name, self._press))
         self.label()
@@ -242,8 +242,6 @@ class Buttons:
             enters = phrase("It was told") if position.state is State.INFORMING else phrase("End the run")
             button.label(enters if name == "enter" else "", letters=letters)
         for name, button in self._row.items():
-            held = name == "pause" and position.state is State.PAUSED
-            button.name = "go on" if held else name
             button.label(
                 phrase("Close") if name == "stop" and closes else "", letters=letters, choices=choices if asks else ()
             )

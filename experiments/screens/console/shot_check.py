@@ -239,6 +239,7 @@ class ShotPage(QWidget):
         self._keeper = DebtKeeper(results, self.unkept.emit)
         self._debt: OwedShot | None = None
         self._method_at = 0
+        self._calls_off = False
         self.over: Callable[[], None] = lambda: None
         self._gun_name = self._unkept = self._why = ""
         self._shown_detail = ("", "wait")
@@ -256,7 +257,8 @@ class ShotPage(QWidget):
             TextLines("detail", most_lines=9),
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape, at_once=True)
+        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
+        self.call_off_button.went_down.connect(self._call_off_at_once)
         self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
         self.stop_button = widgets.button(
             self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop", at_once=True
@@ -381,11 +383,17 @@ class ShotPage(QWidget):
             self._why = why
             self._check.call_off()
 
+    def _call_off_at_once(self) -> None:
+        self._calls_off = self.is_running
+        self.call_off()
+
     def _escape(self) -> None:
-        if self._check is None:
-            self.left.emit()
-        else:
+        """Go back, but not by the press that called off: what came of that is still to be read."""
+        before, self._calls_off = self._calls_off, False
+        if self.is_running:
             self.call_off()
+        elif not before:
+            self.left.emit()
 
     def _take(self, told: ShotProgress) -> None:
         """Show how far the test shot is."""

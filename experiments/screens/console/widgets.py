@@ -13,7 +13,7 @@ from string import Template
 from typing import TypeVar
 
 from PyQt6 import QtGui, QtWidgets
-from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PyQt6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, pyqtSignal
 
 from experiments.screens.participant.messages import Theme
 from experiments.screens.phrases import phrase
@@ -98,8 +98,26 @@ def restyle(widget: QtWidgets.QWidget) -> None:
         style.polish(widget)
 
 
-class AtOnce(QtWidgets.QPushButton):
-    """A button that acts as it goes down, by `pressed`. The second press of a double click is none."""
+class Button(QtWidgets.QPushButton):
+    """A button that says when it went down: once, also where a held pointer slides off it and back.
+
+    The second press of a double click is none.
+    """
+
+    went_down = pyqtSignal()
+
+    def mousePressEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Go down by the mouse."""
+        super().mousePressEvent(event)
+        if self.isDown():
+            self.went_down.emit()
+
+    def keyPressEvent(self, event: QtGui.QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
+        """Go down by Space."""
+        was_down = self.isDown()
+        super().keyPressEvent(event)
+        if self.isDown() and not was_down:
+            self.went_down.emit()
 
     def mouseDoubleClickEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
         """It is the same intent as the first."""
@@ -109,17 +127,17 @@ class AtOnce(QtWidgets.QPushButton):
 
 def button(
     parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "", at_once: bool = False
-) -> QtWidgets.QPushButton:
+) -> Button:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen.
 
     `at_once`: what stops acts as the button goes down, the others as it is let go.
     """
-    made = (AtOnce if at_once else QtWidgets.QPushButton)(f"{text}  [{key.replace('Return', 'Enter')}]")
+    made = Button(f"{text}  [{key.replace('Return', 'Enter')}]")
     made.setObjectName(name)
     made.setAccessibleName(text)
     made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     if at_once:
-        made.pressed.connect(slot)
+        made.went_down.connect(slot)
     else:
         made.clicked.connect(lambda _: slot())
 
