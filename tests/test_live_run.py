@@ -267,6 +267,19 @@ def test_a_train_fires_nothing_while_the_keys_are_elsewhere(away_s: float, goes_
         assert sitting.gun.words.count("rendered") == fired + goes_on
 
 
+def test_a_click_that_comes_from_another_window_fires_at_once(tmp_path: Path) -> None:
+    """The click itself gives the console the keys, of which the next look would say so."""
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        looks(sitting, 3)
+        for _ in range(20):
+            sitting.live.beats.beat(heard=False)
+            sitting.clock.skip(0.1)
+        looks_while_it_waits(sitting)
+        assert by_hand(sitting, events.Fire())
+        assert sitting.gun.words.count("rendered") == 1
+        assert S.PAUSED not in sitting.position.states
+
+
 @pytest.mark.parametrize("state", [S.PREPARING, S.REARMING])
 def test_nor_is_one_before_which_the_program_stood_still_on_its_way(state: State, tmp_path: Path) -> None:
     with sat_at(state, tmp_path) as sitting:

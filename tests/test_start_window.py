@@ -38,6 +38,7 @@ from experiments.screens.console import live, shot_check, widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening, PeopleTable
 from experiments.screens.console.live import study_of
+from experiments.screens.console.shot_check import HUNG
 from experiments.screens.console.start import NOTHING_ARMED, StartWindow
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
@@ -1118,6 +1119,20 @@ def test_the_second_press_of_a_double_click_presses_nothing(name: str, opened: O
         QApplication.sendEvent(beneath, there)
     assert (window.choice, question(window), window.isVisible()) == (None, "", True)
     assert window.pages.currentWidget() is not window.shots
+
+
+def test_a_window_that_hangs_from_the_press_on_fires_no_test_shot(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.screens.console.shot_check.COUNTDOWN_S", 1)
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    for thread in threading.enumerate():  # nothing is heard here until it has ended
+        if thread.name == "test shot":
+            thread.join()
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == "Not fired"
+    assert window.shots.detail.toPlainText().startswith(HUNG)
 
 
 def test_a_stop_was_heard_though_another_window_had_the_keys_behind_it(opened: Open) -> None:

@@ -61,6 +61,10 @@ class Beats:
         if self._in_time == _SETTLED:
             self._alive_s = now_s
 
+    def hear(self) -> None:
+        """Something that was pressed came here, so what is pressed does."""
+        self._deaf_s = math.inf
+
     @property
     def prompt(self) -> bool:
         """Whether the last beats came one soon after the other, so that what was pressed before them has come."""

@@ -37,7 +37,7 @@ _AT_ONCE: frozenset[Name] = frozenset(["emergency", "pause"])
 """What stops does so as its button goes down."""
 
 
-class CommandButton(widgets.Button):
+class CommandButton(widgets.ConsoleButton):
     """A button of a command. It never takes the keys."""
 
     def __init__(self, name: Name, mouse: Mouse, style: str = "") -> None:

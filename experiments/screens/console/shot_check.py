@@ -35,7 +35,7 @@ from experiments.screens.phrases import phrase
 from experiments.session.judging import STANDSTILL_S, Beats
 
 COUNTDOWN_S = 3
-HUNG = phrase("The console stood still in the countdown: nothing was fired.")
+HUNG = phrase("The console did not hear its keys all through the countdown: nothing was fired.")
 _BEAT_MS, _LOOK_S = 100, 0.02
 SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
@@ -154,7 +154,7 @@ class ShotCheck:
         give_up_s = self._clock.now() + STANDSTILL_S
         while not self.beats.prompt and self._clock.now() < give_up_s and not self._off.wait(_LOOK_S):
             pass
-        return self.beats.prompt and self.beats.alive_since_s <= began_s
+        return self.beats.prompt and not self.beats.is_deaf and self.beats.alive_since_s <= began_s
 
     def _disarmed(self, gun: Gun) -> GunStatus | None:
         """The state read back from the gun once it was told to disarm; `None` if it does not say."""
@@ -279,7 +279,7 @@ class ShotPage(QWidget):
 
     def _beats(self) -> None:
         if self._check is not None:
-            self._check.beats.beat()
+            self._check.beats.beat(heard=self.isActiveWindow())
 
     @property
     def is_running(self) -> bool:
@@ -318,6 +318,7 @@ class ShotPage(QWidget):
         )
         self._running(True)
         self._check = ShotCheck(self._setup, method, self._gun, self._clock, self.told.emit)
+        self._beats()  # the first: a window that hangs from here on fires nothing
         self._check.start()
 
     def emergency_stop(self) -> None:

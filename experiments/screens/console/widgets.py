@@ -98,7 +98,7 @@ def restyle(widget: QtWidgets.QWidget) -> None:
         style.polish(widget)
 
 
-class Button(QtWidgets.QPushButton):
+class ConsoleButton(QtWidgets.QPushButton):
     """A button that says when it went down: once, also where a held pointer slides off it and back.
 
     The second press of a double click is none.
@@ -127,12 +127,12 @@ class Button(QtWidgets.QPushButton):
 
 def button(
     parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "", at_once: bool = False
-) -> Button:
+) -> ConsoleButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen.
 
     `at_once`: what stops acts as the button goes down, the others as it is let go.
     """
-    made = Button(f"{text}  [{key.replace('Return', 'Enter')}]")
+    made = ConsoleButton(f"{text}  [{key.replace('Return', 'Enter')}]")
     made.setObjectName(name)
     made.setAccessibleName(text)
     made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
