@@ -8,6 +8,7 @@ import re
 import subprocess
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,15 @@ def start(screen: AtConsole, code: str = "P01", later: int = 0) -> None:
     keys.press("Return", "Control_L")
     keys.press("s", "Control_L")
     screen.stands(RUN)
+
+
+@contextmanager
+def in_a_train(configs: Path, folder: Path, display: str) -> Iterator[AtConsole]:
+    """At the console, while the first train goes on."""
+    with AtConsole(words(configs, "preference", "--participant", "P01"), folder, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        yield screen
 
 
 def close_the_day(screen: AtConsole) -> tuple[int, str]:
@@ -146,9 +156,7 @@ def test_no_text_that_is_dragged_takes_the_keys_of_a_run(quick_configs: Path, tm
 def test_what_stops_does_so_as_its_button_goes_down(
     quick_configs: Path, tmp_path: Path, display: str, name: str, state: str
 ) -> None:
-    with AtConsole(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
-        screen.stands(RUN)
-        screen.to("train", trial=1)
+    with in_a_train(quick_configs, tmp_path, display) as screen:
         with screen.button_down(name):
             screen.until(lambda look: look.state == state)
             screen.off_and_back(name)  # a press counts once
@@ -161,9 +169,7 @@ def test_what_stops_does_so_as_its_button_goes_down(
 def test_a_train_does_not_go_on_while_another_window_has_the_keys(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    with AtConsole(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
-        screen.stands(RUN)
-        screen.to("train", trial=1)
+    with in_a_train(quick_configs, tmp_path, display) as screen:
         with another_window(display):
             screen.keys.focus_on(OTHER)
             screen.until(lambda look: look.state == "paused")
@@ -176,9 +182,7 @@ def test_a_train_does_not_go_on_while_another_window_has_the_keys(
 def test_a_train_does_not_go_on_while_it_is_typed_why_it_stops(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:
-    with AtConsole(words(quick_configs, "preference", "--participant", "P01"), tmp_path, display) as screen:
-        screen.stands(RUN)
-        screen.to("train", trial=1)
+    with in_a_train(quick_configs, tmp_path, display) as screen:
         screen.keys.press("q")
         screen.until(lambda look: look.state == "paused" and look.line)
         screen.keys.type("enough")

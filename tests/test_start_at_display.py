@@ -256,6 +256,20 @@ def test_no_menu_takes_the_keys_of_a_test_shot(pilot: Path, display: str, key: s
     assert not any("Fired" in look["texts"] for look in watched_start.seen(eye))
 
 
+def test_an_escape_that_is_let_go_in_a_test_shot_counts_again_behind_it(pilot: Path, display: str) -> None:
+    with started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        hold_down(screen, "Escape")
+        screen.keys.press("t", "Control_L")
+        wait_for(eye, having("STAND CLEAR"))
+        hold_down(screen, "Escape", down=False)
+        screen.keys.press("F12")
+        wait_for(eye, having("EMERGENCY STOP", "Nothing was fired."))
+        time.sleep(HAND_S)
+        screen.keys.press("Escape")
+        wait_for(eye, having("Next: P01"))
+
+
 def test_f12_is_heard_while_a_menu_is_open(pilot: Path, display: str) -> None:
     with started(pilot, display) as (screen, eye):
         wait_for(eye, having("Next: P01"))

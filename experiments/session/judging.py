@@ -215,7 +215,7 @@ def _fires(event: Event) -> bool:
     return isinstance(event, TO_FIRE) or (isinstance(event, events.Rearm) and event.held_s is None)
 
 
-def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911, PLR0912 - one case an event
+def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911 - one case an event
     match event:
         case _ if isinstance(event, OWN_HAND_EVENTS):
             return _not_asked(moment, event)
@@ -227,10 +227,8 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911, PL
             return _taken(moment, rank)
         case events.Answer(response=response) if not _is_choice(moment, response):
             return f"“{response}” is not among the answers."
-        case events.Fire() | events.Rearm() if moment.gun_silence:
-            return f"See to the gun first: {moment.gun_silence.rstrip('.')}."
-        case events.GoOn() if moment.minimised:
-            return MINIMISED
+        case events.Fire() | events.Rearm() | events.GoOn():
+            return _not_ready(moment, event)
         case events.Undo() if moment.further_back is None:
             return NOTHING_TO_UNDO
         case events.Undo() if moment.further_back == moment.position.correcting:
@@ -239,10 +237,18 @@ def _impossible(moment: Moment, event: Event) -> str:  # noqa: C901, PLR0911, PL
             return NOTHING_TO_REPEAT
         case events.Repeat(trial=Trial() as trial) if trial != moment.repeatable:
             return f"Trial {trial.trial} cannot be presented again any more."
-        case events.Rearm(held_s=float() as held_s) if held_s < REARM_HELD_S:
-            return f"Hold it for {REARM_HELD_S:g} s."
         case _:
             return ""
+
+
+def _not_ready(moment: Moment, event: events.Fire | events.Rearm | events.GoOn) -> str:
+    """What is to be seen to before anything is fired, or goes on."""
+    if isinstance(event, events.GoOn):
+        return MINIMISED if moment.minimised else ""
+    if moment.gun_silence:
+        return f"See to the gun first: {moment.gun_silence.rstrip('.')}."
+    too_short = isinstance(event, events.Rearm) and event.held_s is not None and event.held_s < REARM_HELD_S
+    return f"Hold it for {REARM_HELD_S:g} s." if too_short else ""
 
 
 def _not_asked(moment: Moment, event: events.OwnHandEvent) -> str:

@@ -74,6 +74,8 @@ class AnyHeld(_OverAll):
         del watched
         if not isinstance(event, QKeyEvent) or key_name(event) != self._key or not self._when():
             return False
+        if event.type() == QtCore.QEvent.Type.KeyRelease:
+            return False  # who heard it go down before is to hear that it is up
         if event.type() == QtCore.QEvent.Type.KeyPress and not event.isAutoRepeat():
             if (popup := QApplication.activePopupWidget()) is not None:
                 popup.close()

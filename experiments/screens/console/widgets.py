@@ -108,8 +108,9 @@ class ConsoleButton(QtWidgets.QPushButton):
 
     def mousePressEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Go down by the mouse."""
+        was_down = self.isDown()
         super().mousePressEvent(event)
-        if self.isDown():
+        if self.isDown() and not was_down:  # another button of the mouse may be pressed beside
             self.went_down.emit()
 
     def keyPressEvent(self, event: QtGui.QKeyEvent | None) -> None:  # noqa: N802 - Qt's name
