@@ -68,10 +68,17 @@ def killed_until_done(name: str, folder: Path, draw: random.Random, kills: int) 
             run.communicate()  # ends when the program is gone, which the server kills a little later than its client
         contents = begun(journal) if journal.exists() else None
         if contents is not None and contents.finished:
-            return done, _rows(name, folder)
+            return done, _rows_of_finished(name, folder, journal)
         done += 1
     subprocess.run(list(map(str, warm(*_words(name, folder, "--resume")))), check=True, capture_output=True)
     return done, _rows(name, folder)
+
+
+def _rows_of_finished(name: str, folder: Path, journal: Path) -> list[tuple[str, ...]]:
+    """As `_rows`; the kill may have come between the journal's end and the table, which is then made again from it."""
+    if not Path(f"{_stem(name, folder)}_trials.csv").exists():
+        subprocess.run(list(map(str, warm("rebuild", journal))), check=True, capture_output=True)
+    return _rows(name, folder)
 
 
 def _lines(journal: Path) -> int:
