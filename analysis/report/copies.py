@@ -58,14 +58,14 @@ def process_copies() -> Iterator[None]:
 def in_copy(work: Work, tell: Tell = untold) -> None:
     """Do some work that only writes files: in a copy where `process_copies` allows it and there are cores, else here.
 
-    It waits for a core if copies are at work on all. `tell` hears of the parts of the work, as late as at the end of
-    `process_copies`.
+    It waits while more copies are at work than there are cores: with one more, no core idles while the last ones end.
+    `tell` hears of the parts of the work, as late as at the end of `process_copies`.
     """
     begun = _AT_WORK.get()
     if begun is None or sys.platform != "linux" or cores() == 1:
         work(tell)
         return
-    while len(alive := [copy.process.sentinel for copy in begun if copy.process.is_alive()]) >= cores():
+    while len(alive := [copy.process.sentinel for copy in begun if copy.process.is_alive()]) > cores():
         wait(alive)
     begun.append(_begin(work, tell))
 

@@ -6,12 +6,15 @@ import base64
 import html
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from typing import TYPE_CHECKING
 
 from analysis.report.section import PNG_DPI, REPORT_FILES, PageHead, Section
 from experiments.record.storage import write_whole
+
+if TYPE_CHECKING:
+    from jinja2 import Environment, Template
 
 _VERDICTS = (
     *("agrees", "differs", "differs as predicted", "not published", "not obtained"),
@@ -30,7 +33,7 @@ _BARE = PageHead()
 def write_page(out: Path, title: str, parts: tuple[Section, ...], head: PageHead = _BARE) -> None:
     """Write `report.html` and `report.md` of finished sections; their pictures stand in `out / "figures"` already."""
     for name in REPORT_FILES:
-        text = _render(f"{name}.j2", title, parts, head, out / "figures")
+        text = _render(name, title, parts, head, out / "figures")
         write_whole(out / name, text.encode("utf-8", "backslashreplace"))  # names of files may be no text
 
 
@@ -64,24 +67,39 @@ def with_code(text: str) -> str:
     return _CODE.sub(r"<code>\1</code>", html.escape(text))
 
 
-_ENVIRONMENT = Environment(
-    loader=PackageLoader("analysis.report"),
-    autoescape=select_autoescape(enabled_extensions=("html.j2",)),
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    keep_trailing_newline=True,
-)
-"""One for all pages: it compiles each template once."""
-_ENVIRONMENT.filters |= {"markdown": markdown, "unbroken": unbroken, "with_code": with_code}
+def load_templates() -> None:
+    """Have the templates ready, which takes as long as writing a page: for who has others to wait for."""
+    for name in REPORT_FILES:
+        _template(name)
 
 
-def _render(template: str, title: str, parts: tuple[Section, ...], head: PageHead, figures: Path) -> str:
+@cache
+def _template(name: str) -> Template:
+    return _environment().get_template(f"{name}.j2")
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape  # noqa: PLC0415 - slow
+
+    made = Environment(
+        loader=PackageLoader("analysis.report"),
+        autoescape=select_autoescape(enabled_extensions=("html.j2",)),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    made.filters |= {"markdown": markdown, "unbroken": unbroken, "with_code": with_code}
+    return made
+
+
+def _render(name: str, title: str, parts: tuple[Section, ...], head: PageHead, figures: Path) -> str:
     stems = [picture.stem for section in parts for picture in section.pictures]
     embedded = {stem: _embedded(figures / f"{stem}.png") for stem in stems}
     body = [section for section in parts if not section.appendix]
     appendix = [section for section in parts if section.appendix]
-    return _ENVIRONMENT.get_template(template).render(
+    return _template(name).render(
         title=title, head=head, body=body, appendix=appendix, embedded=embedded, verdicts=_VERDICTS
     )
 

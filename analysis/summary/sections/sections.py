@@ -11,7 +11,7 @@ from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.setups import pooled_setups
 from analysis.report.copies import process_copies
 from analysis.report.labels import labelled
-from analysis.report.page import write_page
+from analysis.report.page import load_templates, write_page
 from analysis.report.section import PageHead, PageNotice, Section, Table, names_in_full, shortened
 from analysis.report.serial import as_json
 from analysis.report.terminal import Tell, untold
@@ -163,8 +163,9 @@ def write_report(
             for one in report.apart:
                 write_figures(out / "figures" / folder_of(one.statistics.data_kind), one)
             meanwhile()
+            parts = sections(report)
+            load_templates()
         tell("figures")
-        parts = sections(report)
         write_page(out, report.title, (*parts, *names_in_full()), head)
     storage.write_whole(out / STATISTICS_FILE, as_json(report.statistics))
     tell("pages")
