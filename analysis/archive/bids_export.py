@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.archive import bids
-from analysis.logs.column_map import ColumnMap, scale_of_others
+from analysis.logs.column_map import ColumnMap
 from analysis.logs.journals import journal_of
+from analysis.logs.measures import scale_of_others
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.report import placing
 from device.messages import first_few

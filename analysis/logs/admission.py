@@ -6,9 +6,8 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
-from analysis.logs.column_map import MappedLog
 from analysis.logs.doubles import ToldRows, doubles_among, told_by_block
 from analysis.logs.doubtful_times import doubts_of_block
 from analysis.logs.files import (
@@ -30,6 +29,9 @@ from analysis.logs.texts import Block
 from experiments.record.tables import DataKind
 from experiments.study import register
 from experiments.study.study import Member
+
+if TYPE_CHECKING:
+    from analysis.logs.column_map import MappedLog
 
 LOGS_A_FILE = 1 << 20
 """Numbers of logs are so far apart from file to file: a mapped file may hold several."""

@@ -30,7 +30,7 @@ from pydantic import AfterValidator, Field, model_validator
 from analysis.logs.cell_rules import number_in
 from analysis.logs.files import LONGEST_LOG, BadLogError
 from analysis.logs.mapped_people import ShortText, check_person, code_in, same_letters, unlisted
-from analysis.logs.measures import MEASURES
+from analysis.logs.measures import MEASURES, NOT_STATED
 from analysis.logs.names import MethodNames
 from analysis.logs.separated import LogMap, SeparatedLine, kept_lines
 from analysis.logs.texts import CsvRecord
@@ -82,18 +82,6 @@ class ScaleMapping(Model):
         return self
 
 
-def scale_of_others(ends: tuple[float, float]) -> str:
-    """What there is to say of another program's ratings: their question and what the ends mean are in no log.
-
-    >>> scale_of_others((1.0, 7.0)).partition(";")[0]
-    'Ratings from 1 to 7 were rescaled linearly to 0 to 10'
-    """
-    low, high = ends
-    as_they_are = (low, high) == (0.0, 10.0)
-    came = "went from 0 to 10" if as_they_are else f"from {low:g} to {high:g} were rescaled linearly to 0 to 10"
-    return f"Ratings {came}; the logs are another program's and tell neither the question nor what the ends mean."
-
-
 class ValuesMapping(Model):
     """What cells mean."""
 
@@ -115,10 +103,6 @@ class MethodsMapping(Model):
     def names(self) -> MethodNames:
         """What the map says of the methods' names."""
         return MethodNames(order=self.levels, labels=self.labels)
-
-
-NOT_STATED = "not stated"
-"""The gun of logs whose map names none."""
 
 
 class ColumnMap(LogMap):
@@ -167,6 +151,31 @@ class ColumnMap(LogMap):
                     raise ValueError(f"{answer} and {role} are both the column {name!r} {rule}")
         return self
 
+    def logs_in(self, content: bytes, file_name: str) -> list[MappedLog]:
+        """The logs in a file, one a participant and study; `BadLogError` if it is no such table."""
+        lines = kept_lines(content, self)
+        people: dict[tuple[str | None, str], list[SeparatedLine]] = {}
+        nobodys: list[BadLogError] = []
+        for line in lines:
+            study = line.cells[self.columns.study] if self.columns.study else None
+            try:
+                people.setdefault((study, _code(line, file_name, self)), []).append(line)
+            except BadLogError as bad:
+                nobodys.append(bad)
+        if not people:
+            raise nobodys[0]
+        same = same_letters(code for _, code in people)
+        found = [
+            MappedLog(
+                study=study,
+                participant=code,
+                experiment=self.experiment,
+                records=_records_or_fault(code, group, self, same),
+            )
+            for (study, code), group in people.items()
+        ]
+        return [*found, _nobodys(nobodys, self)] if nobodys else found
+
 
 _ANSWERS = ("response", "rating", "response_time", "correct")
 """What a participant did, or another program said of it: no such column can say anything else."""
@@ -181,32 +190,6 @@ class MappedLog:
     participant: str
     experiment: str
     records: tuple[CsvRecord, ...] | BadLogError
-
-
-def read_mapped(content: bytes, file_name: str, mapping: ColumnMap) -> list[MappedLog]:
-    """The logs in a file, one a participant and study; `BadLogError` if it is no such table."""
-    lines = kept_lines(content, mapping)
-    people: dict[tuple[str | None, str], list[SeparatedLine]] = {}
-    nobodys: list[BadLogError] = []
-    for line in lines:
-        study = line.cells[mapping.columns.study] if mapping.columns.study else None
-        try:
-            people.setdefault((study, _code(line, file_name, mapping)), []).append(line)
-        except BadLogError as bad:
-            nobodys.append(bad)
-    if not people:
-        raise nobodys[0]
-    same = same_letters(code for _, code in people)
-    found = [
-        MappedLog(
-            study=study,
-            participant=code,
-            experiment=mapping.experiment,
-            records=_records_or_fault(code, group, mapping, same),
-        )
-        for (study, code), group in people.items()
-    ]
-    return [*found, _nobodys(nobodys, mapping)] if nobodys else found
 
 
 def _nobodys(faults: Sequence[BadLogError], mapping: ColumnMap) -> MappedLog:
@@ -227,12 +210,6 @@ def _code(line: SeparatedLine, file_name: str, mapping: ColumnMap) -> str:
     column = mapping.participant.column
     text = file_name if column is None else line.cells[column]
     return code_in(text, mapping.participant, mapping.values.participant, line.number)
-
-
-def is_recoils(content: bytes) -> bool:
-    """Whether a file has the header of one of Recoil's own tables, so that no map is needed."""
-    header = set(content.partition(b"\n")[0].decode("utf-8-sig", errors="replace").strip().split(","))
-    return any({one.name for one in table if one.required} <= header for table in tables.TABLES.values())
 
 
 def _records_or_fault(

@@ -71,3 +71,18 @@ MEASURES: Mapping[str, Measure] = {
     ),
 }
 """By experiment; other designs say by themselves what they measure."""
+
+NOT_STATED = "not stated"
+"""The gun of logs whose map names none."""
+
+
+def scale_of_others(ends: tuple[float, float]) -> str:
+    """What there is to say of another program's ratings: their question and what the ends mean are in no log.
+
+    >>> scale_of_others((1.0, 7.0)).partition(";")[0]
+    'Ratings from 1 to 7 were rescaled linearly to 0 to 10'
+    """
+    low, high = ends
+    as_they_are = (low, high) == (0.0, 10.0)
+    came = "went from 0 to 10" if as_they_are else f"from {low:g} to {high:g} were rescaled linearly to 0 to 10"
+    return f"Ratings {came}; the logs are another program's and tell neither the question nor what the ends mean."

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from analysis.logs.admission import LOGS_A_FILE, Batch, LogsSoFar, WaitingFile
-from analysis.logs.column_map import ColumnMap, MappedLog, is_recoils, read_mapped
 from analysis.logs.design_logs import (
     DesignLog,
     DesignLogs,
@@ -55,12 +55,15 @@ from analysis.logs.kinds import begun_by_kind, kind_of_design, kinds_there
 from analysis.logs.names import MethodNames, names_beside
 from analysis.logs.rules import Log, check_logs
 from analysis.logs.suspicions import turned_round
-from analysis.logs.texts import TextTable, joined, table_of_records, text_tables
+from analysis.logs.texts import TextTable, is_recoils, joined, table_of_records, text_tables
 from experiments.record import tables
 from experiments.record.tables import DataKind
 from experiments.study.folders import PlaceError
 from experiments.study.preregistration import study_folder
 from experiments.study.study import Member
+
+if TYPE_CHECKING:
+    from analysis.logs.column_map import ColumnMap, MappedLog
 
 __all__ = ["Logs", "Problem", "Track", "read_logs"]
 
@@ -324,7 +327,7 @@ def _checked(waiting: Sequence[WaitingFile], mapping: ColumnMap | None) -> Batch
                 raise one.content
             if mapping is not None and not is_recoils(one.content):
                 check_length(one.content, LONGEST_MAPPED)
-                tables.append(_mapped(batch, number, read_mapped(one.content, one.file.name, mapping), mapping))
+                tables.append(_mapped(batch, number, mapping.logs_in(one.content, one.file.name), mapping))
             else:
                 check_length(one.content)
                 batch.journals[number] = compared(one.path, one.content)

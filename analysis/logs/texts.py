@@ -372,3 +372,9 @@ def _persons(study: pd.Categorical, code: pd.Categorical) -> pd.Categorical:
     found, place = np.unique(study.codes.astype(np.int64) * width + code.codes, return_inverse=True)
     names = [f"{study.categories[pair // width]}/{code.categories[pair % width]}" for pair in found.tolist()]
     return _categories(place.astype(np.int32), names)
+
+
+def is_recoils(content: bytes) -> bool:
+    """Whether a file has the header of one of Recoil's own tables, so that no map is needed."""
+    header = set(content.partition(b"\n")[0].decode("utf-8-sig", errors="replace").strip().split(","))
+    return any({one.name for one in table if one.required} <= header for table in tables.TABLES.values())

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.paper.paper import PublishedDirection, PublishedExperiment, PublishedTukeyTest
 from analysis.stats.anova import PairStatistics, check_scores, pairs_of, pooled_pairs, rm_anova
 from analysis.stats.binomial import binomial_test_p
+from analysis.stats.corrections import SIGNIFICANT
 from analysis.stats.studentized_range import studentized_range_isf
 
 WHOLE_PATTERN = "whole pattern"
-SIGNIFICANT = 0.05
 
 Recurrence = NDArray[np.bool_]
 

@@ -12,6 +12,9 @@ from analysis.stats.arrays import FloatArray, numbers, one_of
 
 Correction = Literal["none", "holm", "benjamini-hochberg"]
 
+SIGNIFICANT = 0.05
+"""A p-value below it is called significant."""
+
 
 def holm(p: ArrayLike) -> FloatArray:
     """P-values adjusted for their number m: the running maximum of (m - i) p_(i), i = 0.. in rising order, at most 1.

@@ -5,40 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pandas as pd
 from pydantic import JsonValue
 
-from analysis.logs.column_map import ColumnMap
 from analysis.logs.exclusion_rules import ExclusionEffect, Rules, apply_rules
 from analysis.logs.exclusions import LeftOut, by_study, left_out_by_files, log_remarks
 from analysis.logs.files import Problem, shown_name
 from analysis.logs.journals import NOT_FINISHED
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
-from analysis.paper.paper import Paper, Prediction, load_paper
 from analysis.report import placing
 from analysis.report.section import Section
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, Tell, unseen, untold
-from analysis.summary import remarks_coding
-from analysis.summary.comparison import compare
 from analysis.summary.delivered import delivered_courses
 from analysis.summary.deviations import AnalysisFiles, deviations, frozen_tests
 from analysis.summary.languages import unchecked_languages
 from analysis.summary.participation import exclusion_lines, participation
-from analysis.summary.request_data import answers_to, frozen_answer
-from analysis.summary.requests import Requested, Requests
 from analysis.summary.results import STATISTICS_FILE, RulesApplied, StudyStatistics
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.exclusion_words import dropped_by_rule
 from analysis.summary.summary import summarize
 from analysis.summary.tables_out import TABLE_FILES, result_tables, table_names
 from device.messages import first_few
-from experiments.config.door import ConfigError, load
+from experiments.config.door import load
 from experiments.config.setup import sha256
-from experiments.design.language import METHOD_FACTOR
 from experiments.record.provenance import provenance
+
+if TYPE_CHECKING:
+    from analysis.logs.column_map import ColumnMap
+    from analysis.paper.paper import ComparisonRow, Paper
+    from analysis.summary.remarks_coding import Codebook, CodedRemarks
+    from analysis.summary.requests import Requests
 
 _PARTS = 4
 """Statistics, fits, figures and pages: a bar tells of each."""
@@ -83,7 +82,7 @@ class _Asked:
     mapping: ColumnMap | None
     rules: Rules | None
     requests: Requests | None
-    codebook: remarks_coding.Codebook | None
+    codebook: Codebook | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,13 +127,26 @@ def result_files(request: Request, track: Track = iter) -> dict[str, bytes]:
 
 
 def _loaded(request: Request) -> _Asked:
-    return _Asked(
-        published=load_paper(request.paper) if request.paper else None,
-        mapping=load(ColumnMap, request.columns) if request.columns else None,
-        rules=load(Rules, request.rules) if request.rules else None,
-        requests=load(Requests, request.requests) if request.requests else None,
-        codebook=remarks_coding.load_codebook(request.codebook) if request.codebook else None,
-    )
+    """The files of a request. Most are not given: what reads them is imported with them."""
+    published, mapping, requests, codebook = None, None, None, None
+    if request.paper:
+        from analysis.paper.paper import load_paper  # noqa: PLC0415 - with its file
+
+        published = load_paper(request.paper)
+    if request.columns:
+        from analysis.logs.column_map import ColumnMap  # noqa: PLC0415 - with its file
+
+        mapping = load(ColumnMap, request.columns)
+    if request.requests:
+        from analysis.summary.requests import Requests  # noqa: PLC0415 - with its file
+
+        requests = load(Requests, request.requests)
+    if request.codebook:
+        from analysis.summary.remarks_coding import load_codebook  # noqa: PLC0415 - with its file
+
+        codebook = load_codebook(request.codebook)
+    rules = load(Rules, request.rules) if request.rules else None
+    return _Asked(published=published, mapping=mapping, rules=rules, requests=requests, codebook=codebook)
 
 
 def _usable(request: Request, files: _Asked, track: Track) -> Logs:
@@ -162,7 +174,7 @@ def _analysis(
         log_remarks=log_remarks(logs) or None,
     )
     told = _told(main, files.mapping, logs.remarks)
-    compared = None if files.published is None else compare(statistics, files.published, _predicted(request.paper))
+    compared = None if files.published is None else _compared(statistics, files.published, request.paper)
     report = replace(
         told,
         title=request.title or report_title(logs),
@@ -241,16 +253,13 @@ def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, 
     statistics = replace(found, studies=_by_study(used, fits=request.fits))
     if effect is not None and asked.rules is not None and request.rules is not None:
         statistics = _with_rules(statistics, effect, asked.rules, request.rules)
-    for answered in (_with_remarks, _with_requested):
-        try:
-            statistics = answered(statistics, used, asked, request)
-        except ConfigError as error:
-            if not apart:
-                raise
-            statistics = replace(statistics, warnings=(*statistics.warnings, f"not answered here: {error}"))
     frozen: tuple[JsonValue, ...] = ()
-    if request.requests is None and request.against_frozen and not apart:
-        statistics, frozen = _with_frozen(statistics, used)
+    tests = () if request.requests or not request.against_frozen or apart else frozen_tests(used)
+    if asked.codebook or asked.requests or tests:
+        from analysis.summary.asked import AskedFor, answered  # noqa: PLC0415 - what is asked for by files alone
+
+        files = AskedFor(codebook=asked.codebook, requests=asked.requests, path=request.requests, frozen=tests)
+        statistics, frozen = answered(files, statistics, used, apart=apart)
     return _Analysed(
         logs=used,
         statistics=with_everybody(statistics, used, () if apart else request.left_out),
@@ -259,41 +268,15 @@ def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, 
     )
 
 
-def _with_remarks(statistics: StudyStatistics, logs: Logs, asked: _Asked, _: Request) -> StudyStatistics:
-    book = asked.codebook
-    return statistics if book is None else replace(statistics, remarks=_coded(logs, statistics, book))
-
-
-def _with_requested(statistics: StudyStatistics, logs: Logs, asked: _Asked, request: Request) -> StudyStatistics:
-    if asked.requests is None or request.requests is None:
-        return statistics
-    return replace(statistics, requested=answers_to(asked.requests, request.requests, logs))
-
-
-def _with_frozen(statistics: StudyStatistics, logs: Logs) -> tuple[StudyStatistics, tuple[JsonValue, ...]]:
-    """The statistics with the tests that were frozen, as far as the data have what they name, and those tests."""
-    found, made, warnings = list[Requested](), list[JsonValue](), list[str]()
-    for place, test in enumerate(frozen_tests(logs)):
-        try:
-            found.append(frozen_answer(test, logs))
-        except ValueError as error:
-            warnings.append(f"a frozen test is not made: requests.{place}: {error}")
-        else:
-            made.append(test)
-    said = (*statistics.warnings, *warnings)
-    return replace(statistics, requested=tuple(found) or None, warnings=said), tuple(made)
-
-
 def _told(one: _Analysed, mapping: ColumnMap | None, remarks: Iterable[Problem]) -> ReportData:
     """What is told of data of one kind."""
-    coded = one.statistics.remarks
     registered = ((one.logs.person(where, member.participant_id), member) for where, member in one.logs.joined)
     return ReportData(
         title="",
         statistics=one.statistics,
         files=one.logs.files,
         dropped=tuple(_notes(one.effect)),
-        extra=() if coded is None else (remarks_coding.coding_section(coded),),
+        extra=_coding(one.statistics.remarks),
         planned=not one.logs.mapped,
         rated_from=mapping.rated_from if mapping is not None and one.logs.mapped else None,
         members=dict(registered),
@@ -312,44 +295,22 @@ def _stopped(logs: Logs, remarks: Iterable[Problem]) -> dict[str, frozenset[str]
     return {experiment: frozenset(people) for experiment, people in found.items()}
 
 
-def _predicted(paper: Path | None) -> dict[str, Prediction]:
-    """What the audit says of the published numbers."""
-    if paper is None:
-        return {}
+def _compared(statistics: StudyStatistics, published: Paper, path: Path | None) -> tuple[ComparisonRow, ...]:
+    """The published numbers beside these, with what the audit of the paper's file says of them."""
     from analysis.paper.audit import page, run  # noqa: PLC0415 - of no use without a paper
+    from analysis.summary.comparison import compare  # noqa: PLC0415 - the same
 
-    return page.predictions(run.audit(run.load_paper_file(paper)))
-
-
-def _coded(logs: Logs, statistics: StudyStatistics, book: remarks_coding.Codebook) -> remarks_coding.CodedRemarks:
-    """What people said in their own words, coded. `ConfigError` if the codebook does not fit that."""
-    found = [*_written(logs, statistics)]
-    if not found:
-        raise ConfigError("the codebook: nobody who is analysed was asked for words")
-    remarks = [remark for _, remark in found if remark is not None]
-    try:
-        return remarks_coding.code_remarks(remarks, list(dict.fromkeys(who for who, _ in found)), book)
-    except ValueError as error:
-        raise ConfigError(f"the codebook: {error}") from error
+    audited = page.predictions(run.audit(run.load_paper_file(path))) if path is not None else {}
+    return compare(statistics, published, audited)
 
 
-def _written(logs: Logs, statistics: StudyStatistics) -> Iterator[tuple[str, remarks_coding.WrittenRemark | None]]:
-    """What was asked for in words of whom: every analysed participant once at least."""
-    if statistics.preference is not None:
-        analysed = dict.fromkeys(statistics.preference.participants.codes)
-        yield from analysed.items()
-        yield from (one for one in _remarks_in(logs.ratings, "comment") if one[0] in analysed)
-    for one in logs.designs:
-        for name, question in one.design.questions.items():
-            if question.kind == "text":
-                yield from _remarks_in(one.table, name)
+def _coding(coded: CodedRemarks | None) -> tuple[Section, ...]:
+    """The section of remarks that were coded, if there are some."""
+    if coded is None:
+        return ()
+    from analysis.summary.remarks_coding import coding_section  # noqa: PLC0415 - of no use without a codebook
 
-
-def _remarks_in(table: pd.DataFrame, name: str) -> Iterator[tuple[str, remarks_coding.WrittenRemark]]:
-    methods = table[METHOD_FACTOR] if METHOD_FACTOR in table else table["participant_id"].map(lambda _: "")
-    columns = table["participant_id"].astype(str), methods.astype(str), table[name].fillna("").astype(str)
-    for who, method, text in zip(*columns, strict=True):
-        yield who, remarks_coding.WrittenRemark(participant=who, method=method, text=text)
+    return (coding_section(coded),)
 
 
 def _by_study(logs: Logs, *, fits: bool) -> dict[str, StudyStatistics] | None:

@@ -10,9 +10,8 @@ import html
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analysis.logs.exclusion_rules import KeptTrials
 from analysis.logs.exclusions import LeftOut
 from analysis.report import apa
 from analysis.report.serial import OPTIONAL, SPREAD, NotebookResult, beside
@@ -23,14 +22,17 @@ from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.deviations import StudyDeviations
 from analysis.summary.participation import Participation
 from analysis.summary.question_results import QuestionSummary
-from analysis.summary.remarks_coding import CodedRemarks
-from analysis.summary.requests import Requested
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 from device.messages import how_many
 from experiments.design.language import Level, shown_level
 from experiments.design.methods_section import level_words
 from experiments.record.tables import DataKind
+
+if TYPE_CHECKING:
+    from analysis.logs.exclusion_rules import KeptTrials
+    from analysis.summary.remarks_coding import CodedRemarks
+    from analysis.summary.requests import Requested
 
 STATISTICS_FILE = "statistics.json"
 

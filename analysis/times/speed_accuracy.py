@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from analysis.stats.arrays import FloatArray, IndexArray
-from analysis.times.fit import DiffusionFit
-from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
-from analysis.times.people import (
+from analysis.times.cells import (
     InstructionEffect,
     Mean,
-    PeopleFit,
     PersonCells,
-    SampledFit,
     defined,
     instruction_effects,
     over_people,
     person_cells,
     rate_over_people,
-    sampled_fit,
 )
+from analysis.times.own_trials import REFUSALS, OwnTrials, own_trials
 from analysis.times.trade import (
     QUANTILES,
     ConditionalAccuracy,
@@ -34,6 +31,10 @@ from analysis.times.trade import (
     inverse_efficiency,
     quantile_probability,
 )
+
+if TYPE_CHECKING:
+    from analysis.times.fit import DiffusionFit
+    from analysis.times.people import PeopleFit
 
 BINS = 5
 FEWEST_CORRECT = 5
@@ -224,7 +225,7 @@ def speed_accuracy(
         quantiles=QUANTILES,
         methods=_methods(own, cells, places),
         instruction_effects=tuple(instruction_effects(cells, own.methods, own.instructions, places)),
-        diffusion=_diffusion(sampled_fit(own)) if fits else _not_fitted(n, people),
+        diffusion=_diffusion(own) if fits else _not_fitted(n, people),
         caveats=CAVEATS,
     )
 
@@ -296,7 +297,10 @@ def _not_fitted(trials: int, people: int) -> DiffusionFits:
     return DiffusionFits(people=people, fitted=0, trials=trials, reason=NOT_ASKED, each=None, together=None)
 
 
-def _diffusion(found: SampledFit) -> DiffusionFits:
+def _diffusion(own: OwnTrials) -> DiffusionFits:
+    from analysis.times.people import sampled_fit  # noqa: PLC0415 - of no use unless fits are asked for
+
+    found = sampled_fit(own)
     return DiffusionFits(
         people=found.people,
         fitted=found.fitted,

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from analysis.paper.recurrence import SIGNIFICANT, Recurrence, ShareOfStudies, share_of
+from analysis.paper.recurrence import Recurrence, ShareOfStudies, share_of
 from analysis.stats.anova import check_scores, pairs_of, pooled_pairs, rm_anova
 from analysis.stats.anova_power import rm_anova_power
 from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test_p
+from analysis.stats.corrections import SIGNIFICANT
 from analysis.stats.discrimination import yes_no
 from analysis.stats.studentized_range import studentized_range_isf
 from device.words import DIRECTIONS

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 
-from analysis.paper.recurrence import SIGNIFICANT, WHOLE_PATTERN, ShareOfStudies
+from analysis.paper.recurrence import WHOLE_PATTERN, ShareOfStudies
 from analysis.predict.power.grid import PUBLISHED, Grid, GridCell, StudyDesign
 from analysis.predict.power.planned import Precision, Tally, TextbookPower, merged, precisions, shares, textbook_power
 from analysis.report.serial import NotebookResult, beside, plain
+from analysis.stats.corrections import SIGNIFICANT
 from experiments.record.provenance import provenance
 
 PATTERN = f"{PUBLISHED}, {WHOLE_PATTERN}"

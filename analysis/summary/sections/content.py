@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from analysis.logs.files import Problem
-from analysis.paper.paper import ComparisonRow
-from analysis.paper.recurrence import PatternOdds
 from analysis.report.labels import display_name, named
 from analysis.report.section import Section
 from analysis.summary.delivered import DeliveredCourse
@@ -20,6 +18,8 @@ from experiments.design.methods_section import factor_words
 from experiments.study.study import Member
 
 if TYPE_CHECKING:
+    from analysis.paper.paper import ComparisonRow
+    from analysis.paper.recurrence import PatternOdds
     from analysis.report.figures.shot import ShotPanel
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}

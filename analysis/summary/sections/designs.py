@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from analysis.logs.setups import pooled_setups
-from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import Picture, Section, Table
+from analysis.stats.corrections import SIGNIFICANT
 from analysis.summary.question_results import ConditionSummary, DesignTest, QuestionSummary
 from analysis.summary.results import DesignSummary
 from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData, condition_words, effect_words

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
-from analysis.logs.column_map import scale_of_others
+from analysis.logs.measures import scale_of_others
 from analysis.logs.setups import pooled_setups
-from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.report.section import LISTED, SHOWN, Section, Table
+from analysis.stats.corrections import SIGNIFICANT
 from analysis.stats.paired import PairedT
 from analysis.summary.results import ConfidenceInterval, DirectionStatistics, Pair, WithinStatistics
 from analysis.summary.sections.content import NOT_CORRECTED, TWO_PEOPLE, ReportData, has_many

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from analysis.logs.column_map import NOT_STATED
 from analysis.logs.exclusions import FINISHED, IN_NO_TEST, LeftOut, by_rule
 from analysis.logs.files import Problem, below, folder_above, name_below
+from analysis.logs.measures import NOT_STATED
 from analysis.report import apa
 from analysis.report.section import LISTED, SHOWN, PageNotice, Section, Table
 from analysis.summary.participation import PeopleOfExperiment

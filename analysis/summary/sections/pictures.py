@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.paper.recurrence import SIGNIFICANT
 from analysis.report import apa
 from analysis.report.figures.glyphs import is_drawable
-from analysis.report.figures.shot import ShotPanel, figure_5
 from analysis.report.figures.style import drawn_name
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
+from analysis.stats.corrections import SIGNIFICANT
 from analysis.summary.figures.delivered import figure_delivered
 from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.functions import figure_functions
@@ -36,6 +36,9 @@ from analysis.times.own_trials import TimeSpread
 from device.messages import first_few
 from experiments.record.tables import is_rated
 
+if TYPE_CHECKING:
+    from analysis.report.figures.shot import ShotPanel
+
 _SHOT_FIGURE, _RESULTS_FIGURE = "figure-shot", "figure-results"
 _DIRECTIONS_FIGURE, _TIMES_FIGURE = "figure-directions", "figure-response-times"
 
@@ -48,6 +51,8 @@ def write_figures(folder: Path, report: ReportData) -> None:
     """Every figure that has data, under the stem that its picture names; the one that takes longest first."""
     statistics, direction = report.statistics, report.statistics.direction
     if report.panels:
+        from analysis.report.figures.shot import figure_5  # noqa: PLC0415 - of no use without a shot
+
         figure_5(report.panels, folder / _SHOT_FIGURE)
     if statistics.analysed:
         figure_8(statistics, folder / _RESULTS_FIGURE, report.rated_from)

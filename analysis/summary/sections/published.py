@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-from analysis.paper.paper import AUDITED, ComparisonRow
 from analysis.report import apa
 from analysis.report.labels import named
 from analysis.report.section import Section, Table
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
 from analysis.summary.sections.pictures import shot_picture
+
+if TYPE_CHECKING:
+    from analysis.paper.paper import ComparisonRow
 
 _LUCK = (
     "One replication is luck. The table says how often each published claim recurred over many simulated replications "
@@ -57,6 +60,8 @@ def _audited(comparison: tuple[ComparisonRow, ...]) -> tuple[str, ...]:
 
 def _elsewhere(experiment: str, comparison: tuple[ComparisonRow, ...]) -> bool:
     """Whether an experiment's rows are of the audit alone."""
+    from analysis.paper.paper import AUDITED  # noqa: PLC0415 - of no use without a paper
+
     return any(row.verdict in AUDITED for row in comparison if row.experiment == experiment)
 
 

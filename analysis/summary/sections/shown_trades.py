@@ -11,8 +11,8 @@ from analysis.summary.figures.trade import Trade, TradeNames
 from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary, StudyStatistics
 from analysis.summary.sections.content import condition_words
+from analysis.times.cells import Mean
 from analysis.times.own_trials import INSTRUCTION
-from analysis.times.people import Mean
 from analysis.times.speed_accuracy import SpeedAccuracy
 from device.messages import how_many
 from device.words import DIRECTIONS

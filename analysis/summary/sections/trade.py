@@ -17,7 +17,7 @@ from analysis.summary.figures.trade import (
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.pictures import response_times_picture
 from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
-from analysis.times.people import Mean
+from analysis.times.cells import Mean
 from analysis.times.speed_accuracy import CellTrade, EZLeftOut, NoSpeedAccuracy, Parameter, SpeedAccuracy
 from device.messages import first_few, how_many
 
