@@ -31,6 +31,7 @@ from experiments.earlier_run import (
 from experiments.live_run import LiveRun, RunStopped, Screen
 from experiments.record import replay, storage
 from experiments.record.dictionary import design_dictionary
+from experiments.record.head_design import began_with
 from experiments.record.journal import (
     Contents,
     Head,
@@ -41,7 +42,7 @@ from experiments.record.journal import head as journal_head
 from experiments.record.names import Place
 from experiments.record.owed_shot import owed_shots
 from experiments.record.provenance import provenance
-from experiments.record.rebuild import began_with, shots_table, table
+from experiments.record.rebuild import shots_table, table
 from experiments.record.replay import RunPosition
 from experiments.record.tables import is_simulated
 from experiments.run_request import RunRequest, resolve_seed

@@ -38,10 +38,11 @@ from experiments.config.door import checked_table, load, read_text
 from experiments.config.setup import GunConfig
 from experiments.record import design_columns, journal
 from experiments.record.dictionary import design_dictionary, shots_dictionary
+from experiments.record.head_design import began_with
 from experiments.record.journal import Contents, JournalError
 from experiments.record.names import shots_path
 from experiments.record.provenance import recoil_version
-from experiments.record.rebuild import began_with, rebuild, shots_table
+from experiments.record.rebuild import rebuild, shots_table
 from experiments.record.shots_table import SHOTS
 from experiments.record.tables import DataKind
 from experiments.study.changes import Files, setup_key

@@ -21,9 +21,10 @@ from experiments.config.setup import canonical_json, sha256
 from experiments.config.toml_text import toml_text
 from experiments.design.config import DesignConfig
 from experiments.earlier_run import GAVE_WAY
+from experiments.record.head_design import began_with
 from experiments.record.journal import JournalError, contents_of, link_of, record_line
 from experiments.record.lines import parsed_line
-from experiments.record.rebuild import began_with, table
+from experiments.record.rebuild import table
 from experiments.session.states import EMERGENCY
 from experiments.study import register
 from experiments.study.study import Member

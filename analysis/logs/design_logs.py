@@ -22,10 +22,9 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition, Plan, Trial
 from experiments.record import journal
 from experiments.record.design_columns import columns
-from experiments.record.design_table import went_back
+from experiments.record.head_design import began_with
 from experiments.record.journal import Head, JournalError
-from experiments.record.rebuild import began_with
-from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column
+from experiments.record.tables import CLOCK_SET_BACK, TABLES, Column, went_back
 from experiments.study.changes import FileValues, changed_keys, plain_value
 from experiments.study.preregistration import read_chain
 from experiments.tasks.questions import correct_columns, is_right

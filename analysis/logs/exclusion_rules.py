@@ -45,8 +45,7 @@ from experiments.config.door import Model, Seconds, Share
 from experiments.config.findings import CODE
 from experiments.design.config import DesignConfig
 from experiments.design.language import METHOD_FACTOR
-from experiments.record.design_table import ANTICIPATION_S
-from experiments.record.tables import TRACK_OVER
+from experiments.record.tables import ANTICIPATION_S, TRACK_OVER
 from experiments.tasks.questions import correct_columns
 
 

@@ -14,13 +14,11 @@ from typing import Literal, NamedTuple
 from analysis.logs.files import FULL_ONSET, BadLogError, Problem
 from device.messages import first_few, how_many
 from experiments.design.plan import Plan
-from experiments.record import journal, replay, storage
+from experiments.record import journal, storage
 from experiments.record.journal import JournalError
 from experiments.record.lines import ending_of
-from experiments.record.names import JOURNAL_NAME, misnamed
-from experiments.record.rebuild import began_with, rows_beyond, table
+from experiments.record.names import JOURNAL_NAME, misnamed, shots_path
 from experiments.record.tables import FILE_SUFFIX, DataKind
-from experiments.session.history import answered
 from experiments.study.folders import data_of
 
 RunKind = Literal["run", "practice", "set aside"]
@@ -96,6 +94,11 @@ def journal_of(path: str) -> str:
     return f"{stem.removesuffix(suffix)}{journal.ENDING}"
 
 
+def shots_beside(log: Path) -> Path:
+    """Where the table of shots belongs beside a log, if a sensor measured them."""
+    return shots_path(Path(journal_of(str(log))))
+
+
 def without_table(runs: Iterable[RunFile], tables: Iterable[str]) -> list[RunFile]:
     """The runs, neither practices nor set aside, whose table is not among these."""
     of_runs = [run for run in runs if run.kind == "run"]
@@ -105,15 +108,17 @@ def without_table(runs: Iterable[RunFile], tables: Iterable[str]) -> list[RunFil
 
 def made_again(run: RunFile) -> bytes | BegunRun:
     """The table of a finished run, made from its journal; how far one has come that is not. `BadLogError`: neither."""
+    from experiments.record import rebuild  # noqa: PLC0415 - slow, and of tables that are as they were none is made
+
     try:
         contents = journal.begun(Path(run.path))
         if contents is None:
             return BegunRun(file=run, answered=0, planned=0)
         check_journals_name(run.path, contents.plan)
         if not contents.finished:
-            done = len(answered(replay.history(contents), began_with(contents.head).judgements))
+            done = rebuild.trials_answered(contents)
             return BegunRun(file=run, answered=done, planned=len(contents.plan.trials), data=data_of(contents.head))
-        return table(contents)
+        return rebuild.table(contents)
     except JournalError as error:
         raise BadLogError(f"its table is missing, and the journal is no help: {_without(run.path, error)}") from error
 
@@ -189,13 +194,15 @@ def compared_with(data: bytes, path: str, content: bytes) -> str:
 
 def _edited(where: str, data: bytes, content: bytes, otherwise: str) -> BadLogError:
     """What is said of a table that its journal does not make: whose the journal is, if it is another run's."""
+    from experiments.record import rebuild  # noqa: PLC0415 - slow, and of tables that are as they were none is made
+
     name = Path(where).name
     with suppress(JournalError):  # what is wrong with the head is no news beside a table that differs
         head = journal.head_of(Path(where), data)
         if head is not None and (said := misnamed(Path(where), head.plan)):
             return BadLogError(f"the journal beside it, {name}, {said}; nothing proves this table")
         contents = journal.contents_of(Path(where), data)
-        if contents is not None and _of_another_run(table(contents), content):
+        if contents is not None and _of_another_run(rebuild.table(contents), content):
             other = f"is of another run of {contents.plan.participant_id}, as of another study: no onset is the same"
             return BadLogError(
                 f"the journal beside it, {name}, {other} (rule: a run's table and journal stay together); put the "
@@ -212,16 +219,18 @@ def _of_another_run(made: bytes, content: bytes) -> bool:
 
 def _compared_whole(where: str, content: bytes, data: bytes, *, finished: bool) -> str:
     """The same of a journal that is not finished, or that was changed: every record is read."""
+    from experiments.record import rebuild  # noqa: PLC0415 - slow, and of tables that are as they were none is made
+
     try:
         contents = journal.contents_of(Path(where), data)
         if contents is None:
             return "its journal holds no whole record, so nothing proves the table"
-        made = table(contents)
+        made = rebuild.table(contents)
     except JournalError as error:
         known = "the table is still the one of the finished run" if finished else "so nothing proves the table"
         return f"its journal cannot be trusted, {known}: {_without(where, error)}"
     if made != content:
-        raise _edited(where, data, content, _differs(where, rows_beyond(content, made), finished=finished))
+        raise _edited(where, data, content, _differs(where, rebuild.rows_beyond(content, made), finished=finished))
     if finished:
         return "its journal was changed and says the same as before"
     return f"{NOT_FINISHED}; the table holds what was answered so far, and `recoil run ... --resume` goes on"

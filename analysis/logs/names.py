@@ -11,8 +11,8 @@ from analysis.logs.files import experiment_in_name, results_above
 from analysis.logs.journals import journal_of
 from experiments.design.language import METHOD_FACTOR, shown_level
 from experiments.record import journal
+from experiments.record.head_design import began_with
 from experiments.record.journal import Head, JournalError
-from experiments.record.rebuild import began_with
 from experiments.study.study import by_code
 
 _LOOKED_AT = 200

@@ -12,14 +12,13 @@ from pydantic import JsonValue
 from analysis.logs.exclusion_rules import ExclusionEffect, Rules, apply_rules
 from analysis.logs.exclusions import LeftOut, by_study, left_out_by_files, log_remarks
 from analysis.logs.files import Problem, shown_name
-from analysis.logs.journals import NOT_FINISHED
+from analysis.logs.journals import NOT_FINISHED, shots_beside
 from analysis.logs.kinds import OF_KIND, folder_of
 from analysis.logs.reading import Logs, Track, read_logs, refuse_nothing
 from analysis.report import placing
 from analysis.report.section import Section
 from analysis.report.serial import as_json
 from analysis.report.terminal import Progress, Tell, unseen, untold
-from analysis.summary.delivered import delivered_courses
 from analysis.summary.deviations import AnalysisFiles, deviations, frozen_tests
 from analysis.summary.languages import unchecked_languages
 from analysis.summary.participation import exclusion_lines, participation
@@ -36,6 +35,7 @@ from experiments.record.provenance import provenance
 if TYPE_CHECKING:
     from analysis.logs.column_map import ColumnMap
     from analysis.paper.paper import ComparisonRow, Paper
+    from analysis.summary.delivered import DeliveredCourse
     from analysis.summary.remarks_coding import Codebook, CodedRemarks
     from analysis.summary.requests import Requests
 
@@ -282,8 +282,18 @@ def _told(one: _Analysed, mapping: ColumnMap | None, remarks: Iterable[Problem])
         members=dict(registered),
         analysed=who_is_analysed(one.statistics, one.logs),
         stopped=_stopped(one.logs, remarks),
-        delivered=() if one.logs.mapped else delivered_courses(one.logs.files),
+        delivered=() if one.logs.mapped else _delivered(one.logs.files),
     )
+
+
+def _delivered(files: Sequence[Path]) -> tuple[DeliveredCourse, ...]:
+    """What sensors said of the shots, where there were some."""
+    measured = [log for log in files if shots_beside(log).is_file()]
+    if not measured:
+        return ()
+    from analysis.summary.delivered import delivered_courses  # noqa: PLC0415 - of no use without a sensor
+
+    return delivered_courses(measured)
 
 
 def _stopped(logs: Logs, remarks: Iterable[Problem]) -> dict[str, frozenset[str]]:

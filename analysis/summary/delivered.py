@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.logs.journals import journal_of
+from analysis.logs.journals import shots_beside
 from experiments.delivered.marks import START_SHOTS
-from experiments.record.names import shots_path
 from experiments.record.tables import unguard
 from experiments.session.remarks import NOT_DELIVERED
 
@@ -83,11 +82,8 @@ def delivered_courses(logs: Iterable[Path]) -> tuple[DeliveredCourse, ...]:
 
 
 def _courses(log: Path) -> Iterator[DeliveredCourse]:
-    path = shots_path(Path(journal_of(str(log))))
-    if not path.is_file():
-        return
     try:
-        rows = list(csv.DictReader(io.StringIO(path.read_bytes().decode(), newline="")))
+        rows = list(csv.DictReader(io.StringIO(shots_beside(log).read_bytes().decode(), newline="")))
         for method in dict.fromkeys(row["method"] for row in rows):
             yield _course([(place, row) for place, row in enumerate(rows, start=1) if row["method"] == method])
     except (

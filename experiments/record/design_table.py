@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from datetime import datetime
-from typing import TypeVar
+from collections.abc import Iterable, Iterator
 
 from experiments.design.config import DesignConfig
 from experiments.design.language import EMPTY, QuestionConfig
 from experiments.design.plan import CHOSEN, Plan, Trial, in_interval
 from experiments.design.procedure_problems import followed_question
 from experiments.record import tables
-from experiments.record.tables import Row
+from experiments.record.tables import ANTICIPATION_S, Row, went_back
 from experiments.session import remarks
 from experiments.session.history import History, TrialHistory, by_trial, is_attempt
 from experiments.session.remarks import EntryCorrected
 from experiments.session.steps import NO_MOTION, Answered, Failed, Fired, Interrupted, Presented
 from experiments.session.tracks import adaptive_tracks
 from experiments.tasks.questions import correct_columns, is_right
-
-ANTICIPATION_S = 0.1
-"""A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
 
 
 def design_rows(plan: Plan, history: History, design: DesignConfig) -> list[Row]:
@@ -61,26 +56,6 @@ def _row(plan: Plan, design: DesignConfig, planned: Trial, events: TrialHistory)
         **exposure_row(events),
         **_shown(events),
     }
-
-
-_Moment = TypeVar("_Moment", str, datetime)
-
-
-def went_back(rows: Iterable[Mapping[str, object]], moment: Callable[[str], _Moment | None]) -> Iterator[int]:
-    """Where the stimulus has an earlier date and time than the last one before: the clock was set back.
-
-    Of adaptive tracks the last one before in the track, as one that goes on after a correction comes late in its set. A
-    trial that was repeated may come later than those behind it, so that these are not compared with it.
-    """
-    before: dict[object, _Moment] = {}
-    for place, row in enumerate(rows):
-        onset, track = moment(str(row.get("onset_utc") or "")), row.get("track")
-        if onset is None:
-            continue
-        if track in before and onset < before[track]:
-            yield place
-        if tables.REPEATED not in str(row["flags"] or "").split():
-            before[track] = onset
 
 
 def _compared(trial: Trial) -> Row:

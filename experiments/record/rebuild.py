@@ -10,30 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from device.messages import how_many
-from experiments.config.door import ConfigError, checked_table
-from experiments.design.config import DesignConfig
 from experiments.record import design_columns, design_table, replay, storage
-from experiments.record.journal import Contents, Head, JournalError, read_journal
+from experiments.record.head_design import began_with
+from experiments.record.journal import Contents, JournalError, read_journal
 from experiments.record.names import misnamed, shots_path, table_beside
-from experiments.record.provenance import recoil_version
 from experiments.record.shots_table import SHOTS, shot_rows
 from experiments.record.tables import table_bytes
-
-
-def began_with(head: Head) -> DesignConfig:
-    """The design that a run began with. `JournalError`: the journal's head holds none of this version."""
-    at, setup = f"{head.path}: line 1", head.setup_json if isinstance(head.setup_json, dict) else {}
-    design = setup.get("experiment")
-    if not isinstance(design, dict):
-        raise JournalError(f"no design of this version of Recoil ({head.plan.experiment!r})", at=at)
-    try:
-        return checked_table(DesignConfig, design, at)
-    except ConfigError as error:  # to be corrected as a config the journal is not
-        said = (
-            "…; but correct nothing in a journal: it was changed, or another version of Recoil wrote it (it names "
-            f"{head.provenance.get('recoil', 'unknown')}, this is {recoil_version()}), which reads and rebuilds it"
-        )
-        raise JournalError(said, at=at, value=str(error).removeprefix(f"{at}: ")) from error
+from experiments.session.history import answered
 
 
 def table(contents: Contents) -> bytes:
@@ -41,6 +24,11 @@ def table(contents: Contents) -> bytes:
     design = began_with(contents.head)
     rows = design_table.design_rows(contents.plan, replay.history(contents), design)
     return table_bytes(design_columns.columns(design), rows)
+
+
+def trials_answered(contents: Contents) -> int:
+    """How many trials have an answer to each judgement. `JournalError` as `began_with`."""
+    return len(answered(replay.history(contents), began_with(contents.head).judgements))
 
 
 def rows_beyond(content: bytes, made: bytes) -> int:

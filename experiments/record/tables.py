@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from datetime import datetime
+from typing import Literal, TypeVar
 
 from device import twin
 
@@ -18,6 +19,9 @@ ColumnType = Literal["text", "level", "integer", "number", "flag"]
 
 MISSING = ""
 """What an empty cell says: there is none. 0 is a value."""
+
+ANTICIPATION_S = 0.1
+"""A key that comes sooner was not pressed for what was felt: simple reactions to touch take longer (assumed)."""
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "'")
 
@@ -246,3 +250,23 @@ def _cell(column: Column, value: object) -> str:
     if column.type in ("text", "level"):
         return guard(str(value))
     return repr(value) if isinstance(value, float) else str(value)
+
+
+_Moment = TypeVar("_Moment", str, datetime)
+
+
+def went_back(rows: Iterable[Mapping[str, object]], moment: Callable[[str], _Moment | None]) -> Iterator[int]:
+    """Where the stimulus has an earlier date and time than the last one before: the clock was set back.
+
+    Of adaptive tracks the last one before in the track, as one that goes on after a correction comes late in its set. A
+    trial that was repeated may come later than those behind it, so that these are not compared with it.
+    """
+    before: dict[object, _Moment] = {}
+    for place, row in enumerate(rows):
+        onset, track = moment(str(row.get("onset_utc") or "")), row.get("track")
+        if onset is None:
+            continue
+        if track in before and onset < before[track]:
+            yield place
+        if REPEATED not in str(row["flags"] or "").split():
+            before[track] = onset

@@ -20,12 +20,10 @@ from experiments.design.config import DesignConfig
 from experiments.design.plan import Plan
 from experiments.design.planned import order_shown
 from experiments.load import load_setup, load_study, shipped_folder
-from experiments.record import journal, replay, storage, tables
+from experiments.record import journal, storage, tables
+from experiments.record.head_design import began_with
 from experiments.record.journal import Contents, Head, JournalError
 from experiments.record.names import Place, is_code, participant_folder
-from experiments.record.rebuild import began_with
-from experiments.session.history import answered
-from experiments.session.practice_rounds import is_to_be_repeated
 from experiments.study import register
 from experiments.study.balance import group_of_next_run, is_balanced, row_of_next_run
 from experiments.study.preregistration import (
@@ -340,13 +338,15 @@ def progress_of(where: Place, contents: Contents | None, *, elsewhere: bool = Fa
     """
     if contents is None:
         return RunProgress(experiment=where.experiment, state="open elsewhere" if elsewhere else "not begun")
+    from experiments.record.rebuild import trials_answered  # noqa: PLC0415 - slow, and who reads tables needs none of it
+
     check_whose(where, contents.plan)
-    head, plan, told, design = contents.head, contents.plan, replay.history(contents), began_with(contents.head)
+    head, plan, design = contents.head, contents.plan, began_with(contents.head)
     state: RunState = "done" if contents.finished else "open elsewhere" if elsewhere else "in progress"
     return RunProgress(
         experiment=where.experiment,
         state="synthetic" if head.participant == "synthetic" and state != "open elsewhere" else state,
-        answered=len(answered(told, design.judgements)),
+        answered=trials_answered(contents),
         planned=len(plan.trials),
         began_utc=head.utc,
         last_utc=contents.records[-1].utc,
@@ -389,6 +389,9 @@ def _is_held(path: Path) -> bool:
 
 def _missed(where: Place) -> list[bool]:
     """Of each practice that was done to its end, also of those set aside: whether it missed what the design wants."""
+    from experiments.record import replay  # noqa: PLC0415 - slow, and who reads tables needs none of it
+    from experiments.session.practice_rounds import is_to_be_repeated  # noqa: PLC0415 - the same
+
     practice, found = replace(where, practice=True), list[bool]()
     for path in practice.folder.glob(f"{practice.journal.stem}*{practice.journal.suffix}"):
         with suppress(JournalError):  # a practice is not analysed, so a broken one is nobody's concern

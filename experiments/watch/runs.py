@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Literal
 
 from experiments.record import replay, storage
+from experiments.record.head_design import began_with
 from experiments.record.journal import Contents, Head, JournalError, Record, read_as
 from experiments.record.names import JOURNAL_NAME, misnamed
-from experiments.record.rebuild import began_with
 from experiments.record.tables import DataKind
 from experiments.record.tail import JournalTail
 from experiments.screens import texts

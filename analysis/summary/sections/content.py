@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from analysis.logs.files import Problem
 from analysis.report.labels import display_name, named
 from analysis.report.section import Section
-from analysis.summary.delivered import DeliveredCourse
 from analysis.summary.results import DesignSummary, StudyStatistics, WithinStatistics
 from experiments.design.language import shown_level
 from experiments.design.methods_section import factor_words
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from analysis.paper.paper import ComparisonRow
     from analysis.paper.recurrence import PatternOdds
     from analysis.report.figures.shot import ShotPanel
+    from analysis.summary.delivered import DeliveredCourse
 
 EXPERIMENTS = {"direction": "direction recognition", "preference": "preference"}
 

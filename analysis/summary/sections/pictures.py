@@ -15,7 +15,6 @@ from analysis.report.figures.style import drawn_name
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
 from analysis.stats.corrections import SIGNIFICANT
-from analysis.summary.figures.delivered import figure_delivered
 from analysis.summary.figures.designs import figure_design
 from analysis.summary.figures.functions import figure_functions
 from analysis.summary.figures.pairs import figure_pairs, has_scores
@@ -30,7 +29,6 @@ from analysis.summary.figures.trade import (
 )
 from analysis.summary.results import DesignSummary, DirectionStatistics, Sensitivity, StudyStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
-from analysis.summary.sections.delivered import DELIVERED_FIGURE
 from analysis.summary.sections.shown_trades import ShownTrade, shown_trades
 from analysis.times.own_trials import TimeSpread
 from device.messages import first_few
@@ -65,6 +63,9 @@ def write_figures(folder: Path, report: ReportData) -> None:
     for shown in shown_trades(replace(statistics, designs=designs), drawn_name):
         _write_trade(folder, shown)
     if report.delivered:
+        from analysis.summary.figures.delivered import figure_delivered  # noqa: PLC0415 - of no use without a sensor
+        from analysis.summary.sections.delivered import DELIVERED_FIGURE  # noqa: PLC0415 - the same
+
         figure_delivered(report.delivered, folder / DELIVERED_FIGURE)
 
 

@@ -17,7 +17,6 @@ from analysis.report.serial import as_json
 from analysis.report.terminal import Tell, untold
 from analysis.summary.results import STATISTICS_FILE
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
-from analysis.summary.sections.delivered import delivered_section
 from analysis.summary.sections.designs import result_sentences, sections_of_designs
 from analysis.summary.sections.experiments import (
     direction_section,
@@ -78,6 +77,14 @@ def _finished(report: ReportData) -> Iterator[Section]:
     yield from report.extra
 
 
+def _delivered(report: ReportData) -> Iterator[Section]:
+    """What sensors said of the shots, where there were some."""
+    if report.delivered:
+        from analysis.summary.sections.delivered import delivered_section  # noqa: PLC0415 - of no use without a sensor
+
+        yield from delivered_section(report)
+
+
 def _provenance(report: ReportData) -> Iterator[Section]:
     pairs = (dict(report.statistics.versions or {}) | dict(report.provenance)).items()
     table = Table(caption="Where the numbers come from", header=("What", "Value"), rows=tuple(pairs))
@@ -124,7 +131,7 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     _finished,
     manuscript_section,
     quality_section,
-    delivered_section,
+    _delivered,
     supplement_sections,
     requested_sections,
     trade_sections,
