@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
+from analysis.summary.conditions import varied
 from analysis.summary.design_comparisons import MOST_FACTORS, has_exponent, with_levels_of_their_own
-from analysis.summary.designs import varied
 from analysis.summary.thresholds import MOST_COMPARED
 from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.logs.design_logs import DesignLogs
-from analysis.summary.designs import varied
+from analysis.summary.conditions import varied
 from analysis.summary.results import DesignSummary
 from analysis.times.own_trials import INSTRUCTION
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy, speed_accuracy

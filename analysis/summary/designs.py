@@ -8,19 +8,20 @@ named. Which test there is follows from how many factors vary within and between
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
-from analysis.stats.arrays import FloatArray
 from analysis.stats.binomial import binomial_test
+from analysis.summary.conditions import answer_scores, varied
 from analysis.summary.design_comparisons import condition_tests, nested_between
+from analysis.summary.origins import origin_of_design
 from analysis.summary.pairs import paired_comparison
 from analysis.summary.question_results import ConditionSummary, QuestionSummary
-from analysis.summary.results import DesignSummary, Origin
+from analysis.summary.results import DesignSummary
 from analysis.summary.sensitivity import sensitivity
 from analysis.summary.thresholds import thresholds
 from experiments.design.config import DesignConfig
@@ -56,7 +57,7 @@ def summarise(
             )
             for name, question in asked.items()
         },
-        origin=_hands(design, table),
+        origin=origin_of_design(design, table),
         words={name: int(table[name].notna().sum()) for name in design.questions if name not in asked},
         assumed=design.assumed,
         protocol=methods_section(design, runs_of_groups(design), gun_labels),
@@ -73,29 +74,6 @@ def _labels(design: DesignConfig, gun_labels: Mapping[str, str]) -> dict[str, di
         columns = [name, *([f"{name}_1", f"{name}_2"] if name == design.trial.compare else [])]
         found |= dict.fromkeys(columns, own) if own else {}
     return found
-
-
-def _hands(design: DesignConfig, table: pd.DataFrame) -> Origin:
-    """Who gave each answer to each question that says so, and who rendered each trial that has one."""
-    named = [(name, f"{name}_{part}") for name in design.questions for part in ("source", "by")]
-    asked = {name: source for name, source in named if source in table}
-    if not asked:
-        return Origin(answers={}, guns={})
-    hands = pd.concat([table.loc[table[name].notna(), source] for name, source in asked.items()])
-    return Origin(answers=_counted(hands), guns=_counted(table.loc[table[list(asked)].notna().any(axis=1), "gun"]))
-
-
-def origin_of(rows: pd.DataFrame, source: str) -> Origin:
-    """Whose hands stand in the column `source`, and the guns."""
-    return Origin(answers=_counted(rows[source]), guns=_counted(rows["gun"]))
-
-
-def _counted(names: pd.Series) -> dict[str, int]:
-    return {str(name): int(count) for name, count in sorted(names.value_counts().items(), key=_most_first)}
-
-
-def _most_first(counted: tuple[Hashable, int]) -> tuple[int, str]:
-    return -counted[1], str(counted[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -183,16 +161,6 @@ def _scale(question: QuestionConfig) -> str | None:
     return ", ".join(f"{end:g} = {text}" if text else f"{end:g}" for end, text in ends)
 
 
-def varied(design: DesignConfig) -> list[str]:
-    """The columns by which conditions differ: factors with several levels; of pairs both intervals."""
-    own = {name: one for name, one in design.factors.items() if name not in design.adapted}
-    names = [name for name, factor in own.items() if len(factor.all_levels) > 1]
-    if design.trial.kind != "pair":
-        return names
-    compared = design.trial.compare
-    return [one for name in names for one in ([f"{name}_1", f"{name}_2"] if name == compared else [name])]
-
-
 def _ordered(design: DesignConfig, cells: Iterable[ConditionSummary]) -> tuple[ConditionSummary, ...]:
     """The conditions in the order in which the design names its levels; catch trials last."""
     return tuple(sorted(cells, key=lambda cell: (bool(cell.catch), _place(design, cell.levels))))
@@ -248,20 +216,6 @@ def _ordered_levels(levels: Sequence[Level], name: str, rows: pd.DataFrame) -> t
                 )
             )
     return tuple(found)
-
-
-def answer_scores(question: QuestionConfig, column: pd.Series, *, of_pair: bool = False) -> FloatArray:
-    """The answers as numbers; NaN for none. An unscored choice: 1 for the first answer, 0.5 for a tie of a pair."""
-    if question.kind in {"rating", "ranking"} or question.correct is not None:
-        return pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-    if question.kind == "number":
-        numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(numbers > 0, np.log(numbers), np.nan)
-    given = column.isin(question.named_answers)
-    first = (column == question.named_answers[0]).to_numpy(dtype=np.float64)
-    tied = of_pair & ~column.isin(question.named_answers[:2])
-    return np.where(given, np.where(tied, 0.5, first), np.nan)
 
 
 def _conditions(scored: pd.DataFrame, factors: Sequence[str]) -> Iterator[pd.DataFrame]:

@@ -16,8 +16,9 @@ from analysis.logs.measures import MEASURES
 from analysis.logs.names import MethodNames
 from analysis.logs.reading import Logs
 from analysis.stats.cells import coded
+from analysis.summary.conditions import varied
 from analysis.summary.design_comparisons import nested_between
-from analysis.summary.designs import question_scores, varied
+from analysis.summary.designs import question_scores
 from analysis.summary.requests import (
     LOGARITHMS,
     AnyRequest,

@@ -21,7 +21,6 @@ from analysis.stats.logit_model import Clustering, LogitModel
 from analysis.stats.paired import PairedT, SignedRanks
 from analysis.summary.deviations import StudyDeviations
 from analysis.summary.participation import Participation
-from analysis.summary.question_results import QuestionSummary
 from analysis.times.own_trials import ResponseTimes
 from analysis.times.speed_accuracy import NoSpeedAccuracy, SpeedAccuracy
 from device.messages import how_many
@@ -31,6 +30,7 @@ from experiments.record.tables import DataKind
 
 if TYPE_CHECKING:
     from analysis.logs.exclusion_rules import KeptTrials
+    from analysis.summary.question_results import QuestionSummary
     from analysis.summary.remarks_coding import CodedRemarks
     from analysis.summary.requests import Requested
 

@@ -52,8 +52,7 @@ from analysis.stats.paired import (
 )
 from analysis.summary import results
 from analysis.summary.assumptions import assumptions, not_spherical
-from analysis.summary.design_times import timed_designs
-from analysis.summary.designs import origin_of, summarise
+from analysis.summary.origins import origin_of
 from analysis.times.own_trials import INSTRUCTION, response_times, timed
 from analysis.times.speed_accuracy import speed_accuracy
 from device.messages import first_few
@@ -83,9 +82,7 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
     names = logs.methods
     direction, left_out = _direction(logs.trials, names) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings, names) if len(logs.ratings) else (None, [])
-    designs = _told_apart(
-        {one.design.design: summarise(one.design, one.table, one.gun_labels, fits=fits) for one in logs.designs}
-    )
+    designs = _designs(logs, fits=fits) if logs.designs else {}
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
     found = results.StudyStatistics(
         direction=direction,
@@ -102,6 +99,14 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
     apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
     said = (*anticipations(logs), *_repeated(logs.ratings), *_warnings(found))
     return replace(found, warnings=said, versions=statistics_versions(), kept_apart=apart or None)
+
+
+def _designs(logs: Logs, *, fits: bool) -> dict[str, results.DesignSummary]:
+    from analysis.summary.designs import summarise  # noqa: PLC0415 - slow, and of no use without a design
+
+    return _told_apart(
+        {one.design.design: summarise(one.design, one.table, one.gun_labels, fits=fits) for one in logs.designs}
+    )
 
 
 def _told_apart(designs: Mapping[str, results.DesignSummary]) -> dict[str, results.DesignSummary]:
@@ -203,7 +208,12 @@ def _timed(found: results.StudyStatistics, logs: Logs, *, fits: bool) -> results
     if direction is not None:
         complete, methods, _ = _complete(logs.trials, "direction", logs.methods)
         direction = replace(direction, speed_accuracy=speed_accuracy(complete, methods, fits=fits))
-    return replace(found, direction=direction, designs=timed_designs(found.designs, logs.designs, fits=fits))
+    found = replace(found, direction=direction)
+    if not logs.designs:
+        return found
+    from analysis.summary.design_times import timed_designs  # noqa: PLC0415 - slow, and of no use without a design
+
+    return replace(found, designs=timed_designs(found.designs, logs.designs, fits=fits))
 
 
 def _direction(table: pd.DataFrame, names: MethodNames) -> tuple[results.DirectionStatistics, list[LeftOut]]:

@@ -19,7 +19,7 @@ from analysis.logs.design_logs import DesignLogs
 from analysis.logs.kinds import folder_of
 from analysis.logs.reading import Logs
 from analysis.logs.texts import STUDY
-from analysis.summary.designs import answer_scores, varied
+from analysis.summary.conditions import answer_scores, varied
 from analysis.summary.results import WithinStatistics
 from analysis.times.own_trials import timed
 from experiments.design.language import QuestionConfig

@@ -12,7 +12,6 @@ from analysis.report.labels import display_name
 from analysis.report.section import Section
 from analysis.summary.results import DesignSummary, DirectionStatistics, StudyStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData, has_many
-from analysis.summary.sections.designs import result_sentences
 from analysis.summary.sections.exclusion_words import people_left_out, trials_dropped
 from analysis.summary.sections.experiments import effect_sentence, pairs_sentence
 from device.messages import how_many
@@ -165,6 +164,8 @@ def _guessing(found: WithinStatistics) -> str:
 
 
 def _of_design(report: ReportData, name: str, found: DesignSummary) -> Iterator[str]:
+    from analysis.summary.sections.designs import result_sentences  # noqa: PLC0415 - slow, and of no use without a design
+
     synthetic = "synthetic " if found.origin.synthetic else ""
     analysed = report.analysed.get(name, ())
     people = _people(report, name, how_many(found.n, f"{synthetic}participant"), analysed)

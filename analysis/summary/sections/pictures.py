@@ -15,11 +15,7 @@ from analysis.report.figures.style import drawn_name
 from analysis.report.labels import display_name
 from analysis.report.section import Picture
 from analysis.stats.corrections import SIGNIFICANT
-from analysis.summary.figures.designs import figure_design
-from analysis.summary.figures.functions import figure_functions
-from analysis.summary.figures.pairs import figure_pairs, has_scores
 from analysis.summary.figures.results import figure_8, figure_directions, has_matrix, largest_d_prime
-from analysis.summary.figures.tracks import figure_tracks
 from analysis.summary.figures.trade import (
     figure_conditional_accuracy,
     figure_quantile_probability,
@@ -79,6 +75,8 @@ def _drawable(design: DesignSummary) -> DesignSummary:
 
 
 def _write_design(folder: Path, name: str, design: DesignSummary) -> None:
+    from analysis.summary.figures.designs import figure_design  # noqa: PLC0415 - slow, and of no use without a design
+
     if any(question.drawn for question in design.questions.values()):
         figure_design(design, folder / figure_of(name))
 
@@ -98,6 +96,10 @@ def _write_trade(folder: Path, shown: ShownTrade) -> None:
 
 
 def _write_models(folder: Path, name: str, design: DesignSummary) -> None:
+    from analysis.summary.figures.functions import figure_functions  # noqa: PLC0415 - slow, and of no use without a design
+    from analysis.summary.figures.pairs import figure_pairs, has_scores  # noqa: PLC0415 - the same
+    from analysis.summary.figures.tracks import figure_tracks  # noqa: PLC0415 - the same
+
     for asked, question in design.questions.items():
         if question.thresholds is not None and question.thresholds.conditions:
             figure_functions(design, question.thresholds, folder / functions_figure_of(name, asked))

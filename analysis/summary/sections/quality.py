@@ -10,7 +10,6 @@ from analysis.stats.cells import ByParticipant
 from analysis.stats.diagnostics import OUTLIER_RULE
 from analysis.summary.results import DirectionStatistics, WithinStatistics
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
-from analysis.summary.sections.designs import lacking_conditions
 from analysis.summary.summary import UNDEFINED
 from analysis.times.own_trials import ResponseTimes
 from device.messages import first_few, how_many
@@ -30,6 +29,10 @@ def quality_section(report: ReportData) -> Iterator[Section]:
 
 def _of_designs(report: ReportData) -> Iterator[str]:
     """Who lacks a condition of a design."""
+    if not report.statistics.designs:
+        return
+    from analysis.summary.sections.designs import lacking_conditions  # noqa: PLC0415 - slow, and of no use without a design
+
     for one in report.statistics.designs.values():
         yield from (f"{one.title}: {text}" for text in lacking_conditions(one))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from analysis.report import apa
 from analysis.report.labels import named
@@ -16,12 +15,10 @@ from analysis.stats.equivalence import Equivalence
 from analysis.stats.fixed_effects import Coefficient
 from analysis.stats.mixed_model import LinearMixedModel
 from analysis.stats.random_intercept import RandomInterceptLogit
+from analysis.summary.requests import Requested, RequestKind
 from analysis.summary.sections.content import ReportData
 from analysis.summary.sections.supplement import bayes_cell
 from device.messages import how_many
-
-if TYPE_CHECKING:
-    from analysis.summary.requests import Requested, RequestKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,6 @@ from analysis.report.serial import as_json
 from analysis.report.terminal import Tell, untold
 from analysis.summary.results import STATISTICS_FILE
 from analysis.summary.sections.content import EXPERIMENTS, ReportData
-from analysis.summary.sections.designs import result_sentences, sections_of_designs
 from analysis.summary.sections.experiments import (
     direction_section,
     effect_sentence,
@@ -31,7 +30,6 @@ from analysis.summary.sections.pictures import results_picture, write_figures
 from analysis.summary.sections.preregistration import deviations_sections
 from analysis.summary.sections.published import agreement, odds_section, published_sections, shot_section
 from analysis.summary.sections.quality import quality_section, undefined_numbers
-from analysis.summary.sections.requested import requested_sections
 from analysis.summary.sections.supplement import supplement_sections
 from analysis.summary.sections.trade import trade_details, trade_sections
 from experiments.record import storage
@@ -68,9 +66,21 @@ def _of_experiments(report: ReportData) -> Iterator[str]:
 
 
 def _of_designs(report: ReportData) -> Iterator[str]:
+    if not report.statistics.designs:
+        return
+    from analysis.summary.sections.designs import result_sentences  # noqa: PLC0415 - slow, and of no use without a design
+
     for name, found in report.statistics.designs.items():
         yield from result_sentences(name, found)
         yield from pooled_setups(report.remarks, name)
+
+
+def _designs(report: ReportData) -> Iterator[Section]:
+    """What was found in designs, if logs are of some."""
+    if report.statistics.designs:
+        from analysis.summary.sections.designs import sections_of_designs  # noqa: PLC0415 - slow, and of no use without a design
+
+        yield from sections_of_designs(report)
 
 
 def _finished(report: ReportData) -> Iterator[Section]:
@@ -83,6 +93,14 @@ def _delivered(report: ReportData) -> Iterator[Section]:
         from analysis.summary.sections.delivered import delivered_section  # noqa: PLC0415 - of no use without a sensor
 
         yield from delivered_section(report)
+
+
+def _requested(report: ReportData) -> Iterator[Section]:
+    """What was asked for, if something was: of many kinds of tests."""
+    if report.statistics.requested:
+        from analysis.summary.sections.requested import requested_sections  # noqa: PLC0415 - slow, and seldom asked for
+
+        yield from requested_sections(report)
 
 
 def _provenance(report: ReportData) -> Iterator[Section]:
@@ -127,13 +145,13 @@ READERS_ORDER: tuple[Callable[[ReportData], Iterator[Section]], ...] = (
     _glance,
     direction_section,
     preference_section,
-    sections_of_designs,
+    _designs,
     _finished,
     manuscript_section,
     quality_section,
     _delivered,
     supplement_sections,
-    requested_sections,
+    _requested,
     trade_sections,
     # what follows is the appendix
     all_left_out,

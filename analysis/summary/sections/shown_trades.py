@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from analysis.report import apa
 from analysis.report.labels import display_name
 from analysis.summary.figures.trade import Trade, TradeNames
-from analysis.summary.question_results import QuestionSummary
 from analysis.summary.results import DesignSummary, StudyStatistics
 from analysis.summary.sections.content import condition_words
 from analysis.times.cells import Mean
@@ -16,6 +16,9 @@ from analysis.times.own_trials import INSTRUCTION
 from analysis.times.speed_accuracy import SpeedAccuracy
 from device.messages import how_many
 from device.words import DIRECTIONS
+
+if TYPE_CHECKING:
+    from analysis.summary.question_results import QuestionSummary
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
