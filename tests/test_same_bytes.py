@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from analysis.logs.files import find_logs
-from analysis.summary.designs import origin_of
+from analysis.summary.origins import origin_of
 from tests.surroundings import ELSEWHERE, HERE, write_sites
 
 ALL_BUT_FIGURES = """
