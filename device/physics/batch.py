@@ -37,6 +37,7 @@ from device.physics.equations import (
     model_number,
     pack,
 )
+from device.physics.polynomial import write_out
 from device.physics.shot import ShotSummary, interpret, simulate, summary_from
 
 Records = NDArray[Any]
@@ -64,6 +65,7 @@ Functions = dict[FunctionType, Mapping[str, FunctionType]]
 
 def _callees_first(function: FunctionType) -> Functions:
     """A function and all that it needs, as written in its code."""
+    write_out(function)
     names = function.__code__.co_names
     called = {name: other for name in names if isinstance(other := function.__globals__.get(name), FunctionType)}
     found: Functions = {}

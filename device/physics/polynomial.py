@@ -9,7 +9,8 @@ section 3.5). Where there are more, the interval is halved.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from types import FunctionType
 from typing import Any
 
 from device.physics.equations import ORDER, Coefficients, StepSeries
@@ -56,30 +57,48 @@ def _halve() -> list[str]:
     return [*lines, f"beyond[0] = b{ORDER}"]
 
 
-def from_text(name: str, text: str) -> Any:
-    """A function from its text, written out: in loops, bookkeeping takes most of the time."""
+def from_text(name: str, arguments: str, lines: Callable[[], Iterable[str]]) -> Any:
+    """A function that is written out: in loops, bookkeeping takes most of the time.
+
+    Its text is made and compiled as it is called first, and replaces the two lines that do so: all of them together
+    take longer than a command that fires three shots otherwise does, and it calls few.
+    """
     space: dict[str, Any] = {}
-    exec(text, space)  # noqa: S102 - our own text
-    return space[name]
+
+    def write() -> None:
+        if function.__code__ is unwritten:
+            written: dict[str, Any] = {}
+            exec("\n    ".join([f"def {name}({arguments}):", *lines()]), written)  # noqa: S102 - our own text
+            function.__code__ = written[name].__code__
+
+    space["write"] = write
+    exec(f"def {name}({arguments}):\n    write()\n    return {name}({arguments})", space)  # noqa: S102 - the same
+    function = space[name]
+    function.write, unwritten = write, function.__code__
+    return function
 
 
-def _of_series(name: str, arguments: str, lines: list[str]) -> Any:
+def write_out(function: FunctionType) -> None:
+    """Have the text of a function in place that is compiled further, and not called: where it has one."""
+    getattr(function, "write", lambda: None)()
+
+
+def _of_series(name: str, arguments: str, lines: Callable[[], list[str]]) -> Any:
     """A function of the series that leaves b in their `bernstein`."""
-    stored = (f"b[{j}] = b{j}" for j in range(ORDER + 1))
-    return from_text(name, "\n    ".join([f"def {name}({arguments}):", *lines, *stored]))
+    return from_text(name, arguments, lambda: [*lines(), *(f"b[{j}] = b{j}" for j in range(ORDER + 1))])
 
 
-to_bernstein: Callable[[StepSeries], None] = _of_series("to_bernstein", "w", _to_bernstein())
+to_bernstein: Callable[[StepSeries], None] = _of_series("to_bernstein", "w", _to_bernstein)
 """The Bernstein coefficients over [0, 1] of the polynomial in `other`."""
 to_bernstein_over: Callable[[StepSeries, float, float], None] = _of_series(
-    "to_bernstein_over", "w, low, width", _to_bernstein_over(shifted=True)
+    "to_bernstein_over", "w, low, width", lambda: _to_bernstein_over(shifted=True)
 )
 """The same over [low, low + width]."""
 to_bernstein_up_to: Callable[[StepSeries, float], None] = _of_series(
-    "to_bernstein_up_to", "w, width", _to_bernstein_over(shifted=False)
+    "to_bernstein_up_to", "w, width", lambda: _to_bernstein_over(shifted=False)
 )
 """The same over [0, width]."""
-halve: Callable[[StepSeries], None] = _of_series("halve", "w", _halve())
+halve: Callable[[StepSeries], None] = _of_series("halve", "w", _halve)
 """Those over the first half of their interval in place of those over all of it; the second half's go `beyond`."""
 
 
@@ -96,38 +115,32 @@ def value_and_slope(c: Coefficients, s: float) -> tuple[float, float]:
     return (even * q + odd * s) + c[0], odd + 2.0 * (s * even_slope + q * odd_slope)
 
 
-def _least_sum(name: str, first: int) -> Callable[[Coefficients, float], float]:
-    sums = [f"s{n} = {f's{n - 1} + ' if n > first else ''}sign * c[{n}]" for n in range(first, ORDER + 1)]
-    least = f"return min({', '.join(f's{n}' for n in range(first, ORDER + 1))})"
-    function: Callable[[Coefficients, float], float] = from_text(
-        name, "\n    ".join([f"def {name}(c, sign):", *sums, least])
-    )
-    return function
+def _least_sum(first: int) -> Iterator[str]:
+    yield from (f"s{n} = {f's{n - 1} + ' if n > first else ''}sign * c[{n}]" for n in range(first, ORDER + 1))
+    yield f"return min({', '.join(f's{n}' for n in range(first, ORDER + 1))})"
 
 
-least_sum = _least_sum("least_sum", 0)
+least_sum: Callable[[Coefficients, float], float] = from_text("least_sum", "c, sign", lambda: _least_sum(0))
 """The least of the sums of the coefficients from the first to any of them, times `sign`.
 
 The polynomial, times `sign`, is nowhere in [0, 1] below it: summed by parts (Abel), it is a mean of these sums, whose
 weights are differences of powers of s.
 """
-least_sum_past_first = _least_sum("least_sum_past_first", 1)
+least_sum_past_first: Callable[[Coefficients, float], float] = from_text(
+    "least_sum_past_first", "c, sign", lambda: _least_sum(1)
+)
 """The same without the first coefficient, for the rest of the polynomial divided by s."""
 
 
-def _falls() -> Callable[[Coefficients], float]:
+def _falls() -> Iterator[str]:
     """Sums of -p', sums of those, and sums of those; of each but the last sort the last one alone matters."""
-    lines = [f"s{n} = {f's{n - 1} - ' if n > 1 else '-'}{n}.0 * c[{n}]" for n in range(1, ORDER + 1)]
-    lines += [f"t{n} = {f't{n - 1} + ' if n > 1 else ''}s{n}" for n in range(1, ORDER)]
-    lines += [f"u{n} = {f'u{n - 1} + ' if n > 1 else ''}t{n}" for n in range(1, ORDER - 1)]
-    least = ", ".join([f"s{ORDER}", f"t{ORDER - 1}", *(f"u{n}" for n in range(1, ORDER - 1))])
-    function: Callable[[Coefficients], float] = from_text(
-        "falls", "\n    ".join(["def falls(c):", *lines, f"return min({least})"])
-    )
-    return function
+    yield from (f"s{n} = {f's{n - 1} - ' if n > 1 else '-'}{n}.0 * c[{n}]" for n in range(1, ORDER + 1))
+    yield from (f"t{n} = {f't{n - 1} + ' if n > 1 else ''}s{n}" for n in range(1, ORDER))
+    yield from (f"u{n} = {f'u{n - 1} + ' if n > 1 else ''}t{n}" for n in range(1, ORDER - 1))
+    yield f"return min({', '.join([f's{ORDER}', f't{ORDER - 1}', *(f'u{n}' for n in range(1, ORDER - 1))])})"
 
 
-falls = _falls()
+falls: Callable[[Coefficients], float] = from_text("falls", "c", _falls)
 """Above 0 only where the polynomial falls all the way from 0 to 1; not where it may rise, or one is NaN.
 
 As for `least_sum`, but summed by parts three times: -p' is then (1 - s)^3 times the sum of u_n s^(n - 1), and three
@@ -135,16 +148,13 @@ terms at its end, of the last u, t and s, so that it is above 0 where all of the
 """
 
 
-def _value_at_end() -> Callable[[Coefficients], float]:
+def _value_at_end() -> Iterator[str]:
     """The small coefficients first."""
     even, odd = (" + ".join(f"c[{j}]" for j in range(last, 0, -2)) for last in (ORDER, ORDER - 1))
-    function: Callable[[Coefficients], float] = from_text(
-        "value_at_end", f"def value_at_end(c):\n    return {even} + ({odd}) + c[0]"
-    )
-    return function
+    yield f"return {even} + ({odd}) + c[0]"
 
 
-value_at_end = _value_at_end()
+value_at_end: Callable[[Coefficients], float] = from_text("value_at_end", "c", _value_at_end)
 """The polynomial of even order at s = 1."""
 
 

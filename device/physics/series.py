@@ -20,7 +20,7 @@ or current and speed follow the position, without it depending on L and m.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from device.physics.equations import ORDER, Coefficients, Constants, ShotState, StepSeries, friction
@@ -32,41 +32,38 @@ Pass = Callable[[Constants, float, float, float, StepSeries], float]
 is what friction and the spring's pre-load give at x = 0. A pass gives back how much changed, relative to its size."""
 
 
-def _written_out(name: str, lines: list[str]) -> Any:
-    """A function with these lines, between what all have in common."""
+def _of_gun(name: str, lines: Callable[[], Iterable[str]]) -> Any:
+    """A function with these lines, behind what all have in common."""
     head = [
-        f"def {name}(p, u, push, h, w):",
         "per_reach, per_mass = 1.0 / p.coil_reach, h / p.mass",
         "k, motor, emf, R = p.stiffness, p.motor_constant, p.back_emf, p.resistance",
         "x, v, i, x0 = w.x, w.v, w.i, w.x[0]",
         "g0 = (p.coil_reach - x0) * per_reach",
     ]
-    return from_text(name, "\n    ".join([*head, *lines]))
+    return from_text(name, "p, u, push, h, w", lambda: [*head, *lines()])
 
 
-def _expansion(name: str, *, reciprocal: bool) -> Expand:
+def _expansion(*, reciprocal: bool) -> list[str]:
     """The series from their first coefficients."""
     lines = ["per_inductance, v0, i0 = h / p.inductance, v[0], i[0]"]
     for n in range(ORDER):
         seen = f"({_product('g', 'v', n)})" if reciprocal else f"v{n}"
         current = f"({_first(n, 'u ')}- R * i{n} - emf * {seen}) * per_inductance * {1.0 / (n + 1)!r}"
         lines += [*_position(n), _speed(n), f"i{n + 1} = i[{n + 1}] = {current}"]
-    expand: Expand = _written_out(name, lines)
-    return expand
+    return lines
 
 
-def _pass_of_current() -> Pass:
+def _pass_of_current() -> list[str]:
     """One pass of the series whose current follows the motion."""
     lines = ["lag, v0, reciprocal = p.inductance / h, v[0], p.reciprocal"]
     for n in range(ORDER + 1):
         seen = f"(({_product('g', 'v', n)}) if reciprocal else v{n})"
         lines.append(f"i{n} = ({_first(n, 'u ')}{_later('- lag', 'i', n)} - emf * {seen}) / R")
         lines += [_changed("i", n), *([*_position(n), _speed(n)] if n < ORDER else [])]
-    one: Pass = _written_out("pass_of_current", [*lines, f"return {_largest('di')} / ({_largest('i')} + 1e-300)"])
-    return one
+    return [*lines, f"return {_largest('di')} / ({_largest('i')} + 1e-300)"]
 
 
-def _pass_of_both() -> Pass:
+def _pass_of_both() -> list[str]:
     """One pass of the series whose current and speed follow the position."""
     lines = ["lag, inertia, reciprocal = p.inductance / h, p.mass / h, p.reciprocal"]
     for n in range(ORDER + 1):
@@ -75,14 +72,13 @@ def _pass_of_both() -> Pass:
         lines.append(f"v{n} = ({_first(n, 'u ')}{_later('- lag', 'i', n)} - R * i{n}) / emf")
         lines.append(f"if reciprocal: v{n} = (v{n} - ({_product_before('v', n)})) / g0")
         lines += [_changed("i", n), _changed("v", n), *(_position(n) if n < ORDER else [])]
-    lines += [
+    return [
+        *lines,
         "least = k * (p.preload + abs(x0)) / motor",  # what may cancel in a force
         f"i_change = {_largest('di')} / (max(least, {_largest('i')}) + 1e-300)",
         f"v_change = {_largest('dv')} / (max(R * least / emf, {_largest('v')}) + 1e-300)",
         "return max(i_change, v_change)",
     ]
-    one: Pass = _written_out("pass_of_both", lines)
-    return one
 
 
 def _position(n: int) -> list[str]:
@@ -127,10 +123,10 @@ def _product_before(b: str, n: int) -> str:
     return " + ".join(f"g{n - j} * {b}{j}" for j in range(n)) or "0.0"
 
 
-expand_printed = _expansion("expand_printed", reciprocal=False)
-expand_reciprocal = _expansion("expand_reciprocal", reciprocal=True)
-pass_of_current = _pass_of_current()
-pass_of_both = _pass_of_both()
+expand_printed: Expand = _of_gun("expand_printed", lambda: _expansion(reciprocal=False))
+expand_reciprocal: Expand = _of_gun("expand_reciprocal", lambda: _expansion(reciprocal=True))
+pass_of_current: Pass = _of_gun("pass_of_current", _pass_of_current)
+pass_of_both: Pass = _of_gun("pass_of_both", _pass_of_both)
 
 TOLERANCE = 2e-12
 """Of the first coefficient left out, relative to the largest of the leading ones."""
