@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Literal
 
@@ -120,7 +120,13 @@ def _f_tail(x: Fraction, df: list[float]) -> float:
 
 
 def _range_tail(x: Fraction, df: list[float]) -> float:
-    return float(np.asarray(studentized_range_sf(float(x), df[0], df[1])))
+    return _rounded_range_tail(float(x), *df)
+
+
+@lru_cache(maxsize=1024)
+def _rounded_range_tail(x: float, k: float, df: float) -> float:
+    """Kept, as the two bounds of a root are mostly one number, and points are tried again under other readings."""
+    return float(np.asarray(studentized_range_sf(x, k, df)))
 
 
 _TAILS: dict[Statistic, Callable[[Fraction, list[float]], float]] = {

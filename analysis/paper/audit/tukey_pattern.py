@@ -14,7 +14,6 @@ from itertools import chain, product
 from math import isqrt
 
 import numpy as np
-from scipy.optimize import NonlinearConstraint, minimize
 
 from analysis.paper.audit.lattices import column_choices
 from analysis.paper.audit.means import AnswerScale, check_count, scale_of
@@ -185,6 +184,8 @@ def _fitted(pattern: _Pattern, box: Box, F: Interval, rounding: Rounding) -> lis
     middle, half = np.mean(ends, axis=1), np.diff(ends, axis=1)[:, 0] / 2
     if not (pattern.comparisons and all(half > 0)):
         return []
+    from scipy.optimize import NonlinearConstraint, minimize  # noqa: PLC0415 - slow, and few patterns come here
+
     high, low = np.array([(c.higher, c.lower) for c in pattern.comparisons]).T
     sizes = np.array(pattern.sizes, dtype=np.float64)
 
