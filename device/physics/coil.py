@@ -113,6 +113,7 @@ def creeping_rate(p: Constants, s: ShotState, hold: float) -> float:
 _CREEPING = 0.02  # the magnet creeps if its position changes at most at this part of the rate at which the rest settles
 _LOOK_AGAIN = 20.0  # rings, in radians, or time constants besides the one of what fades, until the next look
 _APART = 1e-12  # relative: closer than this, speed and current are those that follow the position
+_ANYWAY = 1e-4  # the same, so near that the hold of the coil counts as constant until all has faded
 
 
 def until_next_look(p: Constants, hold: float) -> float:
@@ -163,8 +164,12 @@ def has_come_to_creep(p: Constants, s: ShotState, w: StepSeries, rate: float) ->
     soonest = min(how_long(ahead, abs(s.v)), changes)
     slowest = min(how_long(min(s.x, ahead), abs(s.v)), how_long(1.0, rate))
     times, products = settling_rate(p, hold) * slowest, braking_rate(p, hold) * slowest
-    gone = apart <= _APART * math.exp(min(fading_rate(p, hold) * soonest, 30.0))
-    return gone and apart <= min(0.1 * _APART * times * times, math.sqrt(_APART * products), s.farthest)
+    fading = fading_rate(p, hold)
+    shifts = min(0.1 * _APART * times * times, _ANYWAY)
+    if s.heading < 0.0:  # what the hold changes by until all has faded, times the shift
+        shifts = max(shifts, 2.0 * _APART * times * fading * slowest)
+    gone = apart <= _APART * math.exp(min(fading * soonest, 30.0))
+    return gone and apart <= min(shifts, math.sqrt(_APART * products), s.farthest)
 
 
 def span_from_where_it_goes(p: Constants, s: ShotState, w: StepSeries, span: float) -> float:

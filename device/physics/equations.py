@@ -27,7 +27,7 @@ MAX_WORK = 65_000
 """The most work of one shot: its segments, passes over series that settle, and pieces of steps in which roots are
 looked for. It takes about a second, interpreted; a plain shot has about 30."""
 
-FARTHEST = 1e-4
+FARTHEST = 0.1
 """How far apart, relative, speed and current may be from those that follow the position as they are taken for them."""
 
 FULL, NO_INDUCTANCE, CLOSED_FORM, BALLISTIC = range(4)
