@@ -10,7 +10,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from analysis.logs.exclusion_rules import KeptTrials
+from analysis.summary.question_results import QuestionSummary
+from analysis.summary.remarks_coding import CodedRemarks
+from analysis.summary.requests import Requested
 from analysis.summary.results import StudyStatistics
+
+SELDOM = {one.__name__: one for one in (CodedRemarks, KeptTrials, QuestionSummary, Requested)}
+"""What statistics name and import only where something was asked for."""
 
 NULL = {"type": "null"}
 PLAIN = {str: {"type": "string"}, int: {"type": "integer"}, bool: {"type": "boolean"}, type(None): NULL}
@@ -90,7 +97,7 @@ class _Schema:
 
     def _members(self, kind: type) -> Iterator[tuple[str, dict[str, Any], bool]]:
         """Name, schema and whether it is always there; `*` for what stands under names of its own."""
-        hints = typing.get_type_hints(kind, include_extras=True)
+        hints = typing.get_type_hints(kind, localns=SELDOM, include_extras=True)
         for field in fields(kind):
             schema, inner = self.of(hints[field.name]), field.metadata.get("beside")
             if field.metadata.get("unwritten"):
