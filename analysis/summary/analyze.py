@@ -256,10 +256,10 @@ def _analysed(logs: Logs, asked: _Asked, request: Request, tell: Tell = untold, 
     frozen: tuple[JsonValue, ...] = ()
     tests = () if request.requests or not request.against_frozen or apart else frozen_tests(used)
     if asked.codebook or asked.requests or tests:
-        from analysis.summary.asked import AskedFor, answered  # noqa: PLC0415 - what is asked for by files alone
+        from analysis.summary.asked import AskedFor, with_answers  # noqa: PLC0415 - what is asked for by files alone
 
         files = AskedFor(codebook=asked.codebook, requests=asked.requests, path=request.requests, frozen=tests)
-        statistics, frozen = answered(files, statistics, used, apart=apart)
+        statistics, frozen = with_answers(files, statistics, used, apart=apart)
     return _Analysed(
         logs=used,
         statistics=with_everybody(statistics, used, () if apart else request.left_out),

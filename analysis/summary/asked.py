@@ -28,7 +28,7 @@ class AskedFor:
     frozen: Sequence[JsonValue]
 
 
-def answered(
+def with_answers(
     asked: AskedFor, statistics: StudyStatistics, logs: Logs, *, apart: bool
 ) -> tuple[StudyStatistics, tuple[JsonValue, ...]]:
     """The statistics with the answers to all that is asked for, and those of the frozen tests that were made.

@@ -8,6 +8,7 @@ named. Which test there is follows from how many factors vary within and between
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -15,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from analysis.logs.design_logs import DesignLogs
 from analysis.stats.binomial import binomial_test
 from analysis.summary.conditions import answer_scores, varied
 from analysis.summary.design_comparisons import condition_tests, nested_between
@@ -30,6 +32,20 @@ from experiments.design.methods_section import methods_section
 from experiments.design.planned import runs_of_groups
 from experiments.design.procedure_problems import chooses_of_pair, has_success
 from experiments.tasks.questions import chance, correct_columns
+
+
+def summarise_each(logs: Iterable[DesignLogs], *, fits: bool) -> dict[str, DesignSummary]:
+    """What the logs of each design come to, by its name."""
+    return _told_apart({one.design.design: summarise(one.design, one.table, one.gun_labels, fits=fits) for one in logs})
+
+
+def _told_apart(designs: Mapping[str, DesignSummary]) -> dict[str, DesignSummary]:
+    """The designs, those of one title with their names behind it: a retest is a copy under another name."""
+    alike = Counter(one.title.casefold() for one in designs.values())
+    return {
+        name: replace(one, title=f"{one.title} ({name})") if alike[one.title.casefold()] > 1 else one
+        for name, one in designs.items()
+    }
 
 
 def summarise(

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import platform
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from importlib.metadata import PackageNotFoundError, version
@@ -82,7 +81,11 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
     names = logs.methods
     direction, left_out = _direction(logs.trials, names) if len(logs.trials) else (None, [])
     preference, also_out = _preference(logs.ratings, names) if len(logs.ratings) else (None, [])
-    designs = _designs(logs, fits=fits) if logs.designs else {}
+    designs: Mapping[str, results.DesignSummary] = {}
+    if logs.designs:
+        from analysis.summary.designs import summarise_each  # noqa: PLC0415 - slow, and of no use without a design
+
+        designs = summarise_each(logs.designs, fits=fits)
     lacking = (out for name, one in designs.items() for out in _lacking(name, one))
     found = results.StudyStatistics(
         direction=direction,
@@ -99,23 +102,6 @@ def summarize(logs: Logs, *, trade: bool = True, fits: bool = False, tell: Tell 
     apart = {part.kind: replace(summarize(part, trade=trade, fits=fits), versions=None) for part in logs.apart}
     said = (*anticipations(logs), *_repeated(logs.ratings), *_warnings(found))
     return replace(found, warnings=said, versions=statistics_versions(), kept_apart=apart or None)
-
-
-def _designs(logs: Logs, *, fits: bool) -> dict[str, results.DesignSummary]:
-    from analysis.summary.designs import summarise  # noqa: PLC0415 - slow, and of no use without a design
-
-    return _told_apart(
-        {one.design.design: summarise(one.design, one.table, one.gun_labels, fits=fits) for one in logs.designs}
-    )
-
-
-def _told_apart(designs: Mapping[str, results.DesignSummary]) -> dict[str, results.DesignSummary]:
-    """The designs, those of one title with their names behind it: a retest is a copy under another name."""
-    alike = Counter(one.title.casefold() for one in designs.values())
-    return {
-        name: replace(one, title=f"{one.title} ({name})") if alike[one.title.casefold()] > 1 else one
-        for name, one in designs.items()
-    }
 
 
 def _repeated(table: pd.DataFrame) -> Iterator[str]:

@@ -89,6 +89,7 @@ def _verdict_table(experiment: str, comparison: tuple[ComparisonRow, ...]) -> Ta
 def obtained_text(row: ComparisonRow) -> str:
     """The obtained number with as many decimals as are printed; two where nothing is printed.
 
+    >>> from analysis.paper.paper import ComparisonRow
     >>> obtained_text(ComparisonRow(experiment="", quantity="", published="55.7 %", obtained=61.43, verdict="differs"))
     '61.4 %'
     """
