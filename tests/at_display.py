@@ -348,6 +348,21 @@ class AtConsole(AtDisplay):
         xtest.fake_input(display, X.ButtonRelease, 1)
         display.sync()
 
+    @contextmanager
+    def right_button_down(self, name: str) -> Iterator[None]:
+        """The mouse's right button is held, from where it went down on a command's."""
+        from Xlib import X
+        from Xlib.ext import xtest
+
+        x, y = middle(self.look(), name)
+        display = self.keys.display
+        xtest.fake_input(display, X.MotionNotify, x=x, y=y)
+        xtest.fake_input(display, X.ButtonPress, _RIGHT_BUTTON)
+        display.sync()
+        yield
+        xtest.fake_input(display, X.ButtonRelease, _RIGHT_BUTTON)
+        display.sync()
+
     def stop(self, reason: str = "enough") -> tuple[int, str]:
         """Stop the run for a reason, close its window, and wait for the program's end."""
         look = self.ready()

@@ -166,6 +166,29 @@ def test_what_stops_does_so_as_its_button_goes_down(
         assert screen.look().state == state
 
 
+@pytest.mark.parametrize(("name", "state"), [("emergency", "halted"), ("pause", "paused")])
+def test_what_stops_is_heard_beside_a_button_of_the_mouse_that_is_held_elsewhere(
+    quick_configs: Path, tmp_path: Path, display: str, name: str, state: str
+) -> None:
+    with (
+        in_a_train(quick_configs, tmp_path, display) as screen,
+        screen.right_button_down("next"),
+        screen.button_down(name),
+    ):
+        screen.until(lambda look: look.state == state)
+
+
+def test_a_second_click_on_the_emergency_stop_counts_where_the_first_fell_beside_it(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with in_a_train(quick_configs, tmp_path, display) as screen:
+        left, top, width, _ = screen.look().places["emergency"]
+        for beside_px in (-2, 2):
+            screen.keys.click(left + width // 2, top + beside_px)
+            time.sleep(2 * HAND_S)
+        screen.until(lambda look: look.state == "halted")
+
+
 def test_a_train_does_not_go_on_while_another_window_has_the_keys(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

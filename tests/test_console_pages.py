@@ -72,6 +72,24 @@ def test_next_ends_a_train_from_a_page(tmp_path: Path) -> None:
         assert sitting.state is not S.TRAIN
 
 
+@pytest.mark.parametrize("key", ["F1", "L"])
+def test_a_stop_in_a_train_is_taken_from_a_page_and_pauses_first(key: str, tmp_path: Path) -> None:
+    with sat_at(S.TRAIN, tmp_path) as sitting:
+        under_a_page(sitting, key)
+        sitting.press("Q")
+        assert sitting.state is S.PAUSED
+        assert sitting.controls.page is None
+        assert sitting.controls.typing.line
+
+
+def test_a_window_that_is_closed_under_a_page_asks_why_where_that_is_seen(tmp_path: Path) -> None:
+    with sat_at(S.PREPARING, tmp_path) as sitting:
+        under_a_page(sitting)
+        sitting.controls.ask_why_it_stops()
+        assert sitting.controls.page is None
+        assert sitting.controls.typing.line
+
+
 def test_the_emergency_stop_is_taken_from_a_page_which_goes(tmp_path: Path) -> None:
     with sat_at(S.ASKING, tmp_path) as sitting:
         under_a_page(sitting)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import time
@@ -20,7 +21,8 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study.new_study import new_study
 from experiments.study.register import read_register
 from tests import watched_start
-from tests.at_display import HAND_S, AtDisplay, last_record, needs_display, window_manager, x_server
+from tests.at_display import HAND_S, AtDisplay, last_record, needs_display, remarks, window_manager, x_server
+from tests.gun_plugins import ROOT
 from tests.watched_start import wait_for
 
 pytest.importorskip("PyQt6")
@@ -298,6 +300,47 @@ def test_a_signal_in_a_run_ends_the_day_as_well(pilot: Path, display: str) -> No
     assert code == 130, said
     assert last_record(journal)["kind"] == "stopped"
     assert not any(look["texts"] for look in watched_start.seen(eye)[opened:])
+
+
+SLOW_MARKERS = """
+import time
+time.sleep(3)
+IRREGULAR_RATE, local_clock = 0.0, time.monotonic
+class Any:
+    def __init__(self, *_): pass
+    def __getattr__(self, name): return lambda *_: self
+    def have_consumers(self): return False
+StreamInfo = StreamOutlet = Any
+def resolve_bypred(*_): return [1, 2]
+"""
+"""A library of markers that takes its time to start."""
+
+
+@needs_manager
+def test_f12_while_markers_are_starting_halts_the_run_as_it_begins(
+    pilot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl"
+    (pilot / "fake").mkdir()
+    (pilot / "fake" / "pylsl.py").write_text(SLOW_MARKERS)
+    monkeypatch.setenv("PYTHONPATH", f"{pilot / 'fake'}{os.pathsep}{ROOT}")
+    with (
+        virtual_screen("1280x800", manager=True) as display,
+        started(pilot, display, "--lsl") as (screen, eye),
+    ):
+        wait_for(eye, having("Next: P01"))
+        screen.keys.press("Tab", "Shift_L")
+        screen.keys.type("P02")
+        screen.keys.press("Tab")
+        enter(screen, "P02")
+        screen.keys.press("Return", "Control_L")
+        screen.keys.press("s", "Control_L")
+        wait_until(lambda: "please wait" in screen.keys.title_at(640, 400))
+        time.sleep(10 * HAND_S)  # the window manager gives it the keys
+        screen.keys.press("F12")
+        wait_until(lambda: bool(remarks(journal)))
+        assert [one["kind"] for one in remarks(journal)] == ["halted"]
+        screen.kill()
 
 
 def wait_until(happened: Callable[[], bool], timeout_s: float = 60) -> None:

@@ -52,6 +52,7 @@ class CommandButton(widgets.ConsoleButton):
             self.went_down.connect(lambda: mouse.hold(self._press))
             self.released.connect(mouse.let_go)
         elif name in _AT_ONCE:
+            self.stops = True
             self.went_down.connect(lambda: mouse.do(name, self._press))
         else:
             self.clicked.connect(lambda _: mouse.do(self.name, self._press))

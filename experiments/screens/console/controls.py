@@ -187,7 +187,7 @@ class Controls:
             case "emergency":
                 self._offer(events.EmergencyStop())
                 self._set_aside(BUT_REASON)
-            case _ if self.page and name not in _PAGE_COMMANDS + _HOLDS:
+            case _ if self.page and not self._is_for_pages(name):
                 self._run_again()
             case "help" | "list":
                 self._open_or_close(name)
@@ -201,6 +201,10 @@ class Controls:
                 self._after_end(name)
             case _:
                 self._run(name, press)
+
+    def _is_for_pages(self, name: keys.Name) -> bool:
+        """Whether a command is done while a page covers the run: a stop is where it makes the gun silent first."""
+        return name in _PAGE_COMMANDS + _HOLDS or (name == "stop" and self._live.position.base in ARMED)
 
     def _run_again(self) -> None:
         """A key that is not for a page takes it away, and does nothing else: what it does was not to be seen."""
@@ -370,6 +374,7 @@ class Controls:
         """Somebody wants to end a live run, or close its window: a gun that may fire is disarmed first."""
         if self._live.position.base in ARMED:
             self._offer(events.Pause())
+        self.uncover()
         self._ask_for("stop")
 
     def end(self) -> None:

@@ -44,29 +44,31 @@ from experiments.screens.phrases import phrase
 from experiments.study.folders import PlaceError, StudyFolder, progress_of
 
 
-def run_live(request: RunRequest, *, last: str = THANK_PARTICIPANT) -> Finished:
+def run_live(request: RunRequest, *, last: str = THANK_PARTICIPANT, halts: bool = False) -> Finished:
     """Carry out a run at the console. An unfinished one is shown and asked about, but for a synthetic participant.
 
-    `last`: the last sentence of a run that is kept. `PlaceError` without a display, or if the participant's screen does
-    not open.
+    `last`: the last sentence of a run that is kept. `halts`: the emergency stop was pressed before it began.
+    `PlaceError` without a display, or if the participant's screen does not open.
     """
     application()
     try:
-        return _carry_out(request, last)
+        return _carry_out(request, last, halts=halts)
     except UnfinishedRun as found:
         decided = None if request.visual else ask_about(request, found)
         if decided is None:
             raise
-        return _carry_out(gone_on_with(decided), last)
+        return _carry_out(gone_on_with(decided), last, halts=halts)
 
 
-def _carry_out(request: RunRequest, last: str) -> Finished:
+def _carry_out(request: RunRequest, last: str, *, halts: bool) -> Finished:
     clock = RealClock()
     check_font(request)
     with ExitStack() as stack:
         rater = open_rater(stack) if request.visual and request.options.screen else None
         band, said_last = _band_and_last(request, last)
         console = Console(request, clock, band=band, last=said_last)
+        if halts:
+            console.halt_at_once()
         if request.options.any:
             console.participant = _participant(stack, request, console.halt_at_once)
         if request.visual:
@@ -135,25 +137,26 @@ def _of_the_day(
 
     `had` gains the folder of whoever began.
     """
-    said: list[str] = []
+    said, halts = list[str](), threading.Event()
     with ExitStack() as stack:
         if choice.training:
             results = Path(stack.enter_context(tempfile.TemporaryDirectory()))
             choice = replace(choice, results=results, sensor="", markers=False)
         if choice.markers:
             beside = markers(choice.results, said.append)
-            while_shown(phrase("Starting the markers …"), lambda: stack.enter_context(beside))
-        went_wrong = WITHOUT_MARKERS if said else _carried_out(replace(choice, seed=request.seed), study, had)
+            while_shown(phrase("Starting the markers …"), lambda: stack.enter_context(beside), halts.set)
+        chosen = replace(choice, seed=request.seed)
+        went_wrong = WITHOUT_MARKERS if said else _carried_out(chosen, study, had, halts=halts.is_set())
     return "\n".join(filter(None, (*said, went_wrong)))
 
 
 WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_markers}”.", sends_markers=SENDS_MARKERS)
 
 
-def _carried_out(choice: RunRequest, study: StudyFolder, had: set[Path]) -> str:
+def _carried_out(choice: RunRequest, study: StudyFolder, had: set[Path], *, halts: bool) -> str:
     own = set[Path]() if choice.training else {participant_folder(choice.results, choice.participant_id)}
     try:
-        run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment))
+        run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment), halts=halts)
         had |= own
     except RunStopped as stop:
         had |= own

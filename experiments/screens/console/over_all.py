@@ -8,9 +8,10 @@ from contextlib import suppress
 from weakref import WeakSet
 
 from PyQt6 import QtCore
-from PyQt6.QtGui import QKeyEvent
+from PyQt6.QtGui import QKeyEvent, QMouseEvent, QWindow
 from PyQt6.QtWidgets import QApplication, QPlainTextEdit, QTextEdit, QWidget
 
+from experiments.screens.console.widgets import ConsoleButton
 from experiments.screens.console.windows import key_name
 
 _made: WeakSet[_OverAll] = WeakSet()
@@ -87,15 +88,30 @@ class AnyHeld(_OverAll):
 class KeepsKeys(_OverAll):
     """Keeps menus shut, and text from being dragged, while a page is shown: both take every key for themselves.
 
-    A menu takes the first click as well, also one on EMERGENCY STOP.
+    A menu takes the first click as well, also one on EMERGENCY STOP. So does what another button of the mouse is held
+    on: a press on a button that stops is taken from it.
     """
 
     def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
-        """Take what asks for a menu, and a press on text that is only read."""
+        """Take what asks for a menu, a press on text that is only read, and one to stop that would go elsewhere."""
         kind = event.type()
+        if kind == QtCore.QEvent.Type.MouseButtonPress and isinstance(watched, QWindow):
+            return self._stops(event)
         if kind not in _OPENING or not isinstance(watched, QWidget) or watched.window() is not self._window.window():
             return False
         return kind == QtCore.QEvent.Type.ContextMenu or isinstance(watched.parent(), QTextEdit | QPlainTextEdit)
+
+    def _stops(self, event: QtCore.QEvent) -> bool:
+        """Whether a press beside a held button of the mouse was on what stops: Qt gives it to what that is held on."""
+        left = QtCore.Qt.MouseButton.LeftButton
+        if not isinstance(event, QMouseEvent) or event.button() != left or event.buttons() == left:
+            return False
+        under = QApplication.widgetAt(event.globalPosition().toPoint())
+        if not isinstance(under, ConsoleButton) or not under.stops or under.window() is not self._window.window():
+            return False
+        if not under.isDown():
+            under.went_down.emit()
+        return True
 
 
 _OPENING = {

@@ -259,6 +259,7 @@ class ShotPage(QWidget):
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
         self.call_off_button.went_down.connect(self._call_off_at_once)
+        self.call_off_button.stops = True
         self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
         self.stop_button = widgets.button(
             self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop", at_once=True

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from string import Template
 from typing import TypeVar
@@ -101,14 +101,18 @@ def restyle(widget: QtWidgets.QWidget) -> None:
 class ConsoleButton(QtWidgets.QPushButton):
     """A button that says when it went down: once, also where a held pointer slides off it and back.
 
-    The second press of a double click is none.
+    The second press of a double click is none; but of a button that `stops` it is one, if the first missed it.
     """
 
     went_down = pyqtSignal()
+    stops = False
+    _pressed_ms = -inf
 
     def mousePressEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Go down by the mouse."""
         was_down = self.isDown()
+        if event is not None:
+            self._pressed_ms = event.timestamp()
         super().mousePressEvent(event)
         if self.isDown() and not was_down:  # another button of the mouse may be pressed beside
             self.went_down.emit()
@@ -121,9 +125,12 @@ class ConsoleButton(QtWidgets.QPushButton):
             self.went_down.emit()
 
     def mouseDoubleClickEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
-        """It is the same intent as the first."""
-        if event is not None:
-            event.accept()
+        """It is the same intent as the first, which may have missed the button."""
+        if event is None:
+            return
+        event.accept()
+        if self.stops and event.timestamp() - self._pressed_ms > QtWidgets.QApplication.doubleClickInterval():
+            self.mousePressEvent(event)
 
 
 def button(
@@ -137,6 +144,7 @@ def button(
     made.setObjectName(name)
     made.setAccessibleName(text)
     made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    made.stops = at_once
     if at_once:
         made.went_down.connect(slot)
     else:
