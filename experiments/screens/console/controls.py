@@ -63,22 +63,6 @@ class View(Protocol):
         """Close the window of a run that has ended."""
 
 
-_PAGE_COMMANDS: tuple[keys.Name, ...] = ("help", "list", "leave", "emergency", "theme")
-"""What is done while a page covers the run."""
-_HOLDS: tuple[keys.Name, ...] = ("pause", "next")
-"""What makes the gun silent: done from a page as well, which goes. The rest would be done unseen."""
-
-_EVENTS: dict[keys.Name, Event] = {
-    "fire": events.Fire(),
-    "next": events.Next(),
-    "damper": events.DamperSet(),
-    "pause": events.Pause(),
-    "go on": events.GoOn(),
-    "undo": events.Undo(),
-    "emergency": events.EmergencyStop(),
-}
-
-
 class Controls:
     """The experimenter's hands on a live run. `synthetic` is the synthetic participant, where it answers.
 
@@ -187,7 +171,7 @@ class Controls:
             case "emergency":
                 self._offer(events.EmergencyStop())
                 self._set_aside(BUT_REASON)
-            case _ if self.page and not self._is_for_pages(name):
+            case _ if self.page and not keys.is_for_pages(name, self._live.position):
                 self._run_again()
             case "help" | "list":
                 self._open_or_close(name)
@@ -201,10 +185,6 @@ class Controls:
                 self._after_end(name)
             case _:
                 self._run(name, press)
-
-    def _is_for_pages(self, name: keys.Name) -> bool:
-        """Whether a command is done while a page covers the run: a stop is where it makes the gun silent first."""
-        return name in _PAGE_COMMANDS + _HOLDS or (name == "stop" and self._live.position.base in ARMED)
 
     def _run_again(self) -> None:
         """A key that is not for a page takes it away, and does nothing else: what it does was not to be seen."""
@@ -228,7 +208,7 @@ class Controls:
         elif name == "restart":
             self._restart()
         else:
-            self._offer(_EVENTS[name], press)
+            self._offer(keys.EVENTS[name], press)
 
     def _offer(self, event: Event, press: Press | None = None) -> None:
         """Have an event judged, and say what there is to say of it."""

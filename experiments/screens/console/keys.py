@@ -15,7 +15,7 @@ from experiments.design.language import QuestionConfig
 from experiments.screens.phrases import phrase
 from experiments.session import events
 from experiments.session.events import Event
-from experiments.session.states import No, Position, State, change_of
+from experiments.session.states import ARMED, No, Position, State, change_of
 from experiments.session.steps import Ask, Describe, Rate
 from experiments.tasks.questions import CONFIRMS, Choice, choices
 
@@ -406,3 +406,25 @@ class EventClock:
         self._offset_s = min(self._offset_s, now_s - stamp_s)
         at_s = stamp_s + self._offset_s
         return at_s if now_s - at_s < STRANGE_S else now_s
+
+
+EVENTS: dict[Name, Event] = {
+    "fire": events.Fire(),
+    "next": events.Next(),
+    "damper": events.DamperSet(),
+    "pause": events.Pause(),
+    "go on": events.GoOn(),
+    "undo": events.Undo(),
+    "emergency": events.EmergencyStop(),
+}
+"""What a command offers to the run that is no answer and asks for no line."""
+
+_PAGE_COMMANDS: tuple[Name, ...] = ("help", "list", "leave", "emergency", "theme")
+"""What is done while a page covers the run."""
+_HOLDS: tuple[Name, ...] = ("pause", "next")
+"""What makes the gun silent: done from a page as well, which goes. The rest would be done unseen."""
+
+
+def is_for_pages(name: Name, position: Position) -> bool:
+    """Whether a command is done while a page covers the run: a stop is where it makes the gun silent first."""
+    return name in _PAGE_COMMANDS + _HOLDS or (name == "stop" and position.base in ARMED)
