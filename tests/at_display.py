@@ -99,6 +99,24 @@ def another_window(display: str) -> Iterator[None]:
         theirs.close()
 
 
+@contextmanager
+def taken_keyboard(display: str) -> Iterator[None]:
+    """Meanwhile every key goes to another program, whichever window has the focus, as where it asks for a password."""
+    from Xlib import X
+    from Xlib.display import Display
+
+    theirs = Display(display)
+    screen = theirs.screen()
+    window = screen.root.create_window(0, 0, 10, 10, 0, screen.root_depth, X.InputOutput, override_redirect=True)
+    window.map()
+    theirs.sync()
+    assert window.grab_keyboard(True, X.GrabModeAsync, X.GrabModeAsync, X.CurrentTime) == X.GrabSuccess
+    try:
+        yield
+    finally:
+        theirs.close()
+
+
 class AtDisplay:
     """A program on a virtual desktop."""
 

@@ -22,6 +22,7 @@ from tests.at_display import (
     needs_display,
     records,
     remarks,
+    taken_keyboard,
     virtual_display,
 )
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, SHORT_TRIALS, answers, rows, shorten, words
@@ -200,6 +201,23 @@ def test_a_train_does_not_go_on_while_another_window_has_the_keys(
         assert screen.look().says("Another window had the keys")
         screen.keys.press("p")
         screen.until(lambda look: look.state != "paused")
+
+
+def test_a_train_does_not_go_on_while_another_program_has_the_keyboard_whatever_is_clicked(
+    quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    with in_a_train(quick_configs, tmp_path, display) as screen:
+        with taken_keyboard(display):
+            screen.until(lambda look: look.state == "paused")
+            for name, state in (("go on", "preparing"), ("fire", "paused")):
+                screen.click(name)
+                screen.until(lambda look, state=state: look.state == state)
+                time.sleep(20 * HAND_S)  # or the next is the second click of a double one
+            assert screen.look().active  # for all that Qt knows
+        screen.keys.press("p")
+        screen.to("train")
+        screen.keys.press("F12")
+        screen.until(lambda look: look.state == "halted")
 
 
 def test_a_train_does_not_go_on_while_it_is_typed_why_it_stops(

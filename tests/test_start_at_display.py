@@ -21,7 +21,16 @@ from experiments.screens.synthetic import synthetic_screen
 from experiments.study.new_study import new_study
 from experiments.study.register import read_register
 from tests import watched_start
-from tests.at_display import HAND_S, AtDisplay, last_record, needs_display, remarks, window_manager, x_server
+from tests.at_display import (
+    HAND_S,
+    AtDisplay,
+    last_record,
+    needs_display,
+    remarks,
+    taken_keyboard,
+    window_manager,
+    x_server,
+)
 from tests.gun_plugins import ROOT
 from tests.watched_start import wait_for
 
@@ -270,6 +279,22 @@ def test_an_escape_that_is_let_go_in_a_test_shot_counts_again_behind_it(pilot: P
         time.sleep(HAND_S)
         screen.keys.press("Escape")
         wait_for(eye, having("Next: P01"))
+
+
+@needs_manager
+def test_no_test_shot_is_fired_while_another_program_has_the_keyboard(pilot: Path) -> None:
+    with virtual_screen("1280x800", manager=True) as display, started(pilot, display) as (screen, eye):
+        wait_for(eye, having("Next: P01"))
+        with taken_keyboard(display):
+            time.sleep(5 * HAND_S)
+            screen.keys.click(*TEST_SHOT)
+            wait_for(eye, having("STAND CLEAR"))
+            wait_for(eye, having("Not fired"))
+    assert not any("Fired" in look["texts"] for look in watched_start.seen(eye))
+
+
+TEST_SHOT = (637, 772)
+"""Where its button is in a window of 1280 x 800."""
 
 
 def test_f12_is_heard_while_a_menu_is_open(pilot: Path, display: str) -> None:

@@ -28,6 +28,7 @@ from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import (
     errors_to,
     finish_tone,
+    hear_of_grabs,
     hear_of_loss,
     on_loss,
     open_as_left,
@@ -64,6 +65,7 @@ def _only_application() -> QApplication:
     made = QApplication(["recoil"])
     made.setQuitOnLastWindowClosed(False)  # one window may follow the other
     hear_of_loss()
+    hear_of_grabs()
     return made
 
 

@@ -14,6 +14,7 @@ from experiments.screens.console.controls import TextField
 from experiments.screens.console.instructions import Instruction
 from experiments.screens.console.keys import field_at
 from experiments.screens.console.view import About, Seen
+from experiments.screens.console.windows import has_keys
 from experiments.screens.phrases import phrase
 from experiments.session.duration import Ahead, RunTiming, clock_text, end_text, remaining_s
 from experiments.session.states import Position, State
@@ -251,7 +252,7 @@ class SidePanel(QtWidgets.QWidget):
         """Show what is so now."""
         for label, (text, mood) in (
             (self._gun, progress.gun_text(seen)),
-            (self._focus, progress.focus_text(seen, here=self.isActiveWindow())),
+            (self._focus, progress.focus_text(seen, here=has_keys(self))),
         ):
             label.setText(text)
             label.setVisible(bool(text))

@@ -31,6 +31,7 @@ from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
 from experiments.screens.console.over_all import KeepsKeys
 from experiments.screens.console.widgets import TextLines
+from experiments.screens.console.windows import has_keys
 from experiments.screens.phrases import phrase
 from experiments.session.judging import STANDSTILL_S, Beats
 
@@ -280,7 +281,7 @@ class ShotPage(QWidget):
 
     def _beats(self) -> None:
         if self._check is not None:
-            self._check.beats.beat(heard=self.isActiveWindow())
+            self._check.beats.beat(heard=has_keys(self))
 
     @property
     def is_running(self) -> bool:

@@ -22,7 +22,7 @@ from experiments.screens.console.keys import BY_NAME, Name, Typing, own_arrows
 from experiments.screens.console.over_all import KeepsKeys
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import are_keys_heard, marks
-from experiments.screens.console.windows import Keyboard, remember, scaled_sheet
+from experiments.screens.console.windows import Keyboard, has_keys, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.phrases import phrase
 from experiments.screens.texts import saved_text
@@ -281,7 +281,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _beat(self) -> None:
         if self.live is not None:
-            self.live.beats.beat(heard=are_keys_heard(self.participant, here=self.isActiveWindow()))
+            self.live.beats.beat(heard=are_keys_heard(self.participant, here=has_keys(self)))
         self.refresh()
 
     def refresh(self) -> None:

@@ -119,6 +119,43 @@ def _end_all() -> None:
     os._exit(1)
 
 
+class _Grabs(QtCore.QAbstractNativeEventFilter):
+    """Hears from X itself whether another program has grabbed the keyboard: Qt knows of the focus alone.
+
+    A click brings the focus here while the keys still go there.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.elsewhere = False
+
+    def nativeEventFilter(self, kind: Any, message: Any) -> tuple[bool, Any]:  # noqa: N802 - Qt's name
+        """Look at what X says of the focus, as in `xcb_focus_in_event_t`; every event goes on."""
+        if message is not None and kind == b"xcb_generic_event_t":
+            event = message.asstring(9)
+            came, detail, mode = event[0] & 0x7F, event[1], event[8]
+            if came == _FOCUS_IN and detail != _OF_POINTER:
+                self.elsewhere = mode == _WHILE_GRABBED
+            elif came == _FOCUS_OUT and mode == _BY_GRAB:
+                self.elsewhere = True
+        return False, 0
+
+
+_FOCUS_IN, _FOCUS_OUT, _OF_POINTER, _BY_GRAB, _WHILE_GRABBED = 9, 10, 5, 1, 3
+_grabs = _Grabs()
+
+
+def hear_of_grabs() -> None:
+    """Hear of grabbed keyboards from now on, where there is X."""
+    if (app := QtCore.QCoreApplication.instance()) is not None:
+        app.installNativeEventFilter(_grabs)
+
+
+def has_keys(window: QWidget) -> bool:
+    """Whether what is pressed comes to a window."""
+    return window.isActiveWindow() and not _grabs.elsewhere
+
+
 WAKE_MS = 100
 """How often Python looks at signals while Qt waits."""
 
