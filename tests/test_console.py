@@ -179,6 +179,14 @@ def test_what_stops_is_heard_beside_a_button_of_the_mouse_that_is_held_elsewhere
         screen.until(lambda look: look.state == state)
 
 
+@pytest.mark.parametrize(("name", "state"), [("emergency", "halted"), ("pause", "paused")])
+def test_what_stops_does_so_by_the_wrong_button_of_the_mouse_too(
+    quick_configs: Path, tmp_path: Path, display: str, name: str, state: str
+) -> None:
+    with in_a_train(quick_configs, tmp_path, display) as screen, screen.right_button_down(name):
+        screen.until(lambda look: look.state == state)
+
+
 def test_a_second_click_on_the_emergency_stop_counts_where_the_first_fell_beside_it(
     quick_configs: Path, tmp_path: Path, display: str
 ) -> None:

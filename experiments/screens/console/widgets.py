@@ -101,7 +101,8 @@ def restyle(widget: QtWidgets.QWidget) -> None:
 class ConsoleButton(QtWidgets.QPushButton):
     """A button that says when it went down: once, also where a held pointer slides off it and back.
 
-    The second press of a double click is none; but of a button that `stops` it is one, if the first missed it.
+    The second press of a double click is none; but of a button that `stops` it is one, if the first missed it. Such a
+    button takes any button of the mouse: in haste it may be the wrong one.
     """
 
     went_down = pyqtSignal()
@@ -113,6 +114,10 @@ class ConsoleButton(QtWidgets.QPushButton):
         was_down = self.isDown()
         if event is not None:
             self._pressed_ms = event.timestamp()
+        if event is not None and self.stops and event.button() != Qt.MouseButton.LeftButton:
+            event.accept()
+            self.went_down.emit()
+            return
         super().mousePressEvent(event)
         if self.isDown() and not was_down:  # another button of the mouse may be pressed beside
             self.went_down.emit()
