@@ -192,13 +192,17 @@ def test_a_signal_ends_run_and_window_in_order(
         screen.to("train", trial=2)
         screen.keys.press("n")  # whatever is open
         screen.until(lambda look: look.line)
+        screen.keys.type("it got warm")
+        screen.until(lambda look: look.typed == "it got warm")
         screen.process.send_signal(number)
         code, said = screen.end()
     assert code == 130, said
     assert f"recoil: stopped: {number.name}. Go on with --resume." in said
     check_disarmed(Watch(str(tmp_path)))
-    last = records(tmp_path / f"{PREFERENCE}_journal.jsonl")[-1]
-    assert (last["kind"], last["reason"]) == ("stopped", number.name)
+    journal = tmp_path / f"{PREFERENCE}_journal.jsonl"
+    assert (records(journal)[-1]["kind"], records(journal)[-1]["reason"]) == ("stopped", number.name)
+    (noted,) = remarks(journal, "noted")
+    assert noted["text"] == "note: it got warm"
 
 
 # the emergency stop

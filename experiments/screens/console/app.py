@@ -129,7 +129,7 @@ class Console:
 
         The window stays open at the end until it is closed. Without a window, an error is raised at once.
         """
-        with on_loss(self._lose_display), signals_to(self._leave), errors_to(self._fail), _quick_threads():
+        with on_loss(self._lose_display), signals_to(self._end), errors_to(self._fail), _quick_threads():
             self._thread.start()
             self._loop.exec()
             self._thread.join()
@@ -173,6 +173,14 @@ class Console:
             synthetic=self.synthetic,
             kept=not window.about.band,
         )
+
+    def _end(self, reason: str) -> None:
+        """As `_leave`, by a signal: nobody is asked about what is half typed."""
+        try:
+            if self.window is not None and self.window.controls is not None and self.window.ended is None:
+                self.window.controls.keep_typed()
+        finally:
+            self._leave(reason)
 
     def _leave(self, reason: str) -> None:
         """Stop the run, also one that has not begun yet, and close the window when it has ended."""

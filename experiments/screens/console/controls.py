@@ -361,6 +361,11 @@ class Controls:
         """The run is over: what is open or held now is for nothing any more."""
         self.ended, self._open, self._held = True, None, None
 
+    def keep_typed(self) -> None:
+        """The run ends without asking: what is half typed, for a line or a question, is kept as notes."""
+        self._set_aside()
+        self._keep_typed()
+
     def _enter_line(self, name: keys.Name, trial: Trial, press: Press) -> None:
         text = typed_line(self._view.typed("line"))
         if not text:
