@@ -242,6 +242,7 @@ def test_a_test_shot_whose_key_was_let_go_while_the_console_stood_still_is_not_f
         screen.until(lambda look: look.says("Let go too soon: hold it for 1 s."))
         assert len(cell.watch.calls("fired")) == fired
         screen.hold("t", until=lambda look: look.state != "rearming")
+        wait_for(lambda: remarks(cell.journal, "test-shot"), "the test shot is on record")
     (shot,) = remarks(cell.journal, "test-shot")
     assert 1.0 <= shot["held_s"] < 1.5
 

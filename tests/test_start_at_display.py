@@ -288,8 +288,7 @@ def test_no_test_shot_is_fired_while_another_program_has_the_keyboard(pilot: Pat
         with taken_keyboard(display):
             time.sleep(5 * HAND_S)
             screen.keys.click(*TEST_SHOT)
-            wait_for(eye, having("STAND CLEAR"))
-            wait_for(eye, having("Not fired"))
+            wait_for(eye, having("Not fired"))  # the countdown may be over before it is looked at
     assert not any("Fired" in look["texts"] for look in watched_start.seen(eye))
 
 
