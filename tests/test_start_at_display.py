@@ -307,16 +307,21 @@ def test_f12_is_heard_while_a_menu_is_open(pilot: Path, display: str) -> None:
         assert screen.end()[0] == 0
 
 
+def begin_another(screen: AtDisplay, code: str) -> None:
+    """Somebody else than who is next begins."""
+    screen.keys.press("Tab", "Shift_L")
+    screen.keys.type(code)
+    screen.keys.press("Tab")
+    enter(screen, code)
+    screen.keys.press("Return", "Control_L")
+    screen.keys.press("s", "Control_L")
+
+
 def test_a_signal_in_a_run_ends_the_day_as_well(pilot: Path, display: str) -> None:
     journal = pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl"
     with started(pilot, display) as (screen, eye):
         wait_for(eye, having("Next: P01"))
-        screen.keys.press("Tab", "Shift_L")
-        screen.keys.type("P02")
-        screen.keys.press("Tab")
-        enter(screen, "P02")
-        screen.keys.press("Return", "Control_L")
-        screen.keys.press("s", "Control_L")
+        begin_another(screen, "P02")
         wait_until(lambda: last_record(journal).get("kind") == "step")
         opened = len(watched_start.seen(eye))
         screen.process.terminate()
@@ -353,12 +358,7 @@ def test_f12_while_markers_are_starting_halts_the_run_as_it_begins(
         started(pilot, display, "--lsl") as (screen, eye),
     ):
         wait_for(eye, having("Next: P01"))
-        screen.keys.press("Tab", "Shift_L")
-        screen.keys.type("P02")
-        screen.keys.press("Tab")
-        enter(screen, "P02")
-        screen.keys.press("Return", "Control_L")
-        screen.keys.press("s", "Control_L")
+        begin_another(screen, "P02")
         wait_until(lambda: "please wait" in screen.keys.title_at(640, 400))
         time.sleep(10 * HAND_S)  # the window manager gives it the keys
         screen.keys.press("F12")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from experiments.screens.xkeys import Hands
@@ -13,11 +14,14 @@ class TypingHands(Hands):
     """Two hands that type."""
 
     def title_at(self, x_px: int, y_px: int) -> str:
-        """The title of the window that is to be seen at a place of the display."""
+        """The title of the window that is to be seen at a place of the display; none of one that is just going."""
+        from Xlib.error import BadWindow
+
         window = root = self.display.screen().root
         sign, title = self.display.intern_atom("_NET_WM_NAME"), ""
-        while not title and (window := window.translate_coords(root, x_px, y_px).child):
-            title = window.get_full_text_property(sign) or window.get_wm_name() or ""
+        with suppress(BadWindow):
+            while not title and (window := window.translate_coords(root, x_px, y_px).child):
+                title = window.get_full_text_property(sign) or window.get_wm_name() or ""
         return str(title)
 
     def minimise(self, title: str) -> None:

@@ -174,7 +174,7 @@ def _analysis(
         log_remarks=log_remarks(logs) or None,
     )
     told = _told(main, files.mapping, logs.remarks)
-    compared = None if files.published is None else _compared(statistics, files.published, request.paper)
+    compared = _compared(statistics, files.published, request.paper) if files.published and request.paper else None
     report = replace(
         told,
         title=request.title or report_title(logs),
@@ -305,13 +305,12 @@ def _stopped(logs: Logs, remarks: Iterable[Problem]) -> dict[str, frozenset[str]
     return {experiment: frozenset(people) for experiment, people in found.items()}
 
 
-def _compared(statistics: StudyStatistics, published: Paper, path: Path | None) -> tuple[ComparisonRow, ...]:
+def _compared(statistics: StudyStatistics, published: Paper, path: Path) -> tuple[ComparisonRow, ...]:
     """The published numbers beside these, with what the audit of the paper's file says of them."""
     from analysis.paper.audit import page, run  # noqa: PLC0415 - of no use without a paper
     from analysis.summary.comparison import compare  # noqa: PLC0415 - the same
 
-    audited = page.predictions(run.audit(run.load_paper_file(path))) if path is not None else {}
-    return compare(statistics, published, audited)
+    return compare(statistics, published, page.predictions(run.audit(run.load_paper_file(path))))
 
 
 def _coding(coded: CodedRemarks | None) -> tuple[Section, ...]:
