@@ -172,8 +172,6 @@ class LiveRun:
 
     def offer(self, event: Event, press: Press | None = None) -> EventVerdict:
         """Have an event judged, and taken if it may be. Never waits. `press`: by the experimenter's hand."""
-        if press is not None:
-            self.beats.hear()
         with self.news:
             moment = self.moment
             meant, text = judging.meant(moment, event)

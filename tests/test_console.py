@@ -222,6 +222,9 @@ def test_a_train_does_not_go_on_while_another_program_has_the_keyboard_whatever_
                 screen.until(lambda look, state=state: look.state == state)
                 time.sleep(20 * HAND_S)  # or the next is the second click of a double one
             assert screen.look().active  # for all that Qt knows
+            kept = [one["kind"] for one in records(next(tmp_path.rglob("*_journal.jsonl")))]
+            assert "shot" in kept
+            assert "shot" not in kept[kept.index("remark") :]
         screen.keys.press("p")
         screen.to("train")
         screen.keys.press("F12")

@@ -267,17 +267,22 @@ def test_a_train_fires_nothing_while_the_keys_are_elsewhere(away_s: float, goes_
         assert sitting.gun.words.count("rendered") == fired + goes_on
 
 
-def test_a_click_that_comes_from_another_window_fires_at_once(tmp_path: Path) -> None:
-    """The click itself gives the console the keys, of which the next look would say so."""
+@pytest.mark.parametrize("heard", [True, False])
+def test_a_click_from_another_window_fires_at_once_if_it_gives_the_console_the_keys(
+    heard: bool, tmp_path: Path
+) -> None:
+    """It gives none where another program has grabbed the keyboard; the next look would say so too late."""
     with sat_at(S.PREPARING, tmp_path) as sitting:
         looks(sitting, 3)
         for _ in range(20):
             sitting.live.beats.beat(heard=False)
             sitting.clock.skip(0.1)
-        looks_while_it_waits(sitting)
+        if heard:
+            sitting.live.beats.hear()
+            looks_while_it_waits(sitting)
         assert by_hand(sitting, events.Fire())
-        assert sitting.gun.words.count("rendered") == 1
-        assert S.PAUSED not in sitting.position.states
+        assert sitting.gun.words.count("rendered") == heard
+        assert (sitting.position.why == KEYS_ELSEWHERE) is (S.PAUSED in sitting.position.states) is not heard
 
 
 @pytest.mark.parametrize("state", [S.PREPARING, S.REARMING])

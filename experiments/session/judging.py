@@ -62,7 +62,7 @@ class Beats:
             self._alive_s = now_s
 
     def hear(self) -> None:
-        """Something that was pressed came here, so what is pressed does."""
+        """A key came here, or would have: so what is pressed is heard."""
         self._deaf_s = math.inf
 
     @property

@@ -131,6 +131,7 @@ class Controls:
 
     def down(self, name: keys.Name, at_s: float) -> None:
         """The key of a command went down."""
+        self._live.beats.hear()
         press = self.press(at_s)
         if name == "rearm":
             self.hold(press)
@@ -164,6 +165,12 @@ class Controls:
         if hold is not None and (held_s := hold.held_s(self._clock.now())) >= REARM_HELD_S:
             self._held = None
             self._offer(events.Rearm(held_s=held_s), press)
+
+    def clicked(self, name: keys.Name, press: Press, *, heard: bool) -> None:
+        """The button of a command was clicked; `heard`: a key comes here as well."""
+        if heard:
+            self._live.beats.hear()
+        self.do(name, press)
 
     def do(self, name: keys.Name, press: Press) -> None:
         """Carry out a command."""

@@ -388,7 +388,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
     def do(self, name: Name, press: Press) -> None:
         """The button of a command was clicked."""
         if self.controls is not None:
-            self.controls.do(name, press)
+            self.controls.clicked(name, press, heard=has_keys(self))
         elif name == "stop" and self.ended is not None:
             self.close()
         self._show_soon()
