@@ -1,7 +1,9 @@
 """What each command takes, and what it imports: `make soak`.
 
 With the folder of an older version in `RECOIL_OLD` (`git worktree add --detach FOLDER COMMIT`, then `make full` there)
-both are run in turn, and the table has their ratio; else it has new times alone.
+both are run in turn, and the table has their ratio; else it has new times alone. The old one has two times: with all of
+Python compiled before, as where a command is run once more, and as it was set up, where nothing could be written since.
+Setting up compiles the new one.
 """
 
 from __future__ import annotations
@@ -22,10 +24,16 @@ from tests.waiting import wait_for
 
 pytestmark = pytest.mark.soak
 
+AS_SET_UP = "as it was set up"
 OLD = Path(os.environ["RECOIL_OLD"]) if os.environ.get("RECOIL_OLD") else None
-PROGRAMS = {"new": RECOIL} | ({} if OLD is None else {"old": OLD / ".venv" / "bin" / "recoil"})
-SURROUNDINGS = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+PROGRAMS = {"new": RECOIL}
+if OLD is not None:
+    PROGRAMS |= dict.fromkeys(("old", AS_SET_UP), OLD / ".venv" / "bin" / "recoil")
+SURROUNDINGS = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
 """Programs are compiled once, as where they are installed: else most of a short command is the compiler of Python."""
+UNCOMPILED = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPYCACHEPREFIX": os.devnull}
+LONG = ("bench", "design")
+"""What does not take its time to start."""
 HEAVY = ("numpy", "scipy.special", "scipy.stats", "pandas", "pyarrow", "matplotlib", "numba", "pingouin", "PyQt6")
 
 
@@ -59,12 +67,14 @@ COMMANDS = (
 )
 
 
-def median_times(turns: int, run: Callable[[str, Path], float]) -> dict[str, float]:
+def median_times(
+    turns: int, run: Callable[[str], float], programs: Sequence[str] = tuple(PROGRAMS)
+) -> dict[str, float]:
     """The median seconds of each program, one after the other in each turn."""
-    taken: dict[str, list[float]] = {name: [] for name in PROGRAMS}
+    taken: dict[str, list[float]] = {name: [] for name in programs}
     for _ in range(turns):
-        for name, program in PROGRAMS.items():
-            taken[name].append(run(name, program))
+        for name in programs:
+            taken[name].append(run(name))
     return {name: statistics.median(each) for name, each in taken.items()}
 
 
@@ -72,13 +82,20 @@ def said(times: dict[str, float]) -> str:
     """Times in words, with their ratio where there are two."""
     if "old" not in times:
         return f"{times['new']:.2f} s"
-    return f"{times['new']:.2f} s, was {times['old']:.2f} s: {times['new'] / times['old']:.2f} of it"
+    as_set_up = f"; was {times[AS_SET_UP]:.2f} s {AS_SET_UP}" if AS_SET_UP in times else ""
+    return f"{times['new']:.2f} s, was {times['old']:.2f} s: {times['new'] / times['old']:.2f} of it{as_set_up}"
 
 
-def spent(program: Path, words: Sequence[str | Path], codes: Sequence[int]) -> float:
+def surroundings(name: str) -> dict[str, str]:
+    """The variables that a program is run with."""
+    return SURROUNDINGS | (UNCOMPILED if name == AS_SET_UP else {})
+
+
+def spent(name: str, words: Sequence[str | Path], codes: Sequence[int]) -> float:
     """The seconds of one run."""
     start_s = time.perf_counter()
-    done = subprocess.run([program, *words], capture_output=True, text=True, check=False, env=SURROUNDINGS)
+    words = [PROGRAMS[name], *words]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=surroundings(name))
     taken_s = time.perf_counter() - start_s
     assert done.returncode in codes, done.stderr
     return taken_s
@@ -98,16 +115,18 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda one: one.words.split()[0])
 def test_a_command_ends_in_its_time(command: Command, runs: dict[str, Path], tmp_path: Path, soak: Soak) -> None:
-    def run(name: str, program: Path) -> float:
+    def run(name: str) -> float:
         out = tmp_path / f"{name}-{len(list(tmp_path.iterdir()))}"
         out.mkdir()
         words = command.words.replace("OUT", str(out)).replace("RUNS", str(runs[name]))
-        return spent(program, words.split(), command.codes)
+        return spent(name, words.split(), command.codes)
 
+    is_long = command.words.startswith(LONG)
+    programs = [name for name in PROGRAMS if name != AS_SET_UP or not is_long]
     if command.turns > 1:
-        for name, program in PROGRAMS.items():
-            run(name, program)  # warm
-    times = median_times(command.turns, run)
+        for name in programs:
+            run(name)  # warm
+    times = median_times(command.turns, run, programs)
     load = os.getloadavg()[0]
     soak(
         f"`recoil {command.words.replace('OUT/', '').replace('RUNS', 'logs of one participant')}`",
@@ -121,7 +140,7 @@ def test_a_command_ends_in_its_time(command: Command, runs: dict[str, Path], tmp
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda one: one.words.split()[0])
 def test_what_a_command_imports(command: Command, runs: dict[str, Path], tmp_path: Path, soak: Soak) -> None:
-    if command.words.startswith(("bench", "design")):
+    if command.words.startswith(LONG):
         pytest.skip("their time is not that of their imports")
     words = command.words.replace("OUT", str(tmp_path)).replace("RUNS", str(runs["new"])).split()
     python = RECOIL.with_name("python")
@@ -152,13 +171,13 @@ def test_the_start_window_stands(tmp_path: Path, soak: Soak) -> None:
             there = looks.screen().root.get_full_property(listed, 0)
             return there is not None and len(there.value) > 0
 
-        def run(which: str, program: Path) -> float:
+        def run(which: str) -> float:
             folder = tmp_path / which
             folder.mkdir(exist_ok=True)
-            words = [program, "run", "direction", "--screen", "console", "--results", folder]
+            words = [PROGRAMS[which], "run", "direction", "--screen", "console", "--results", folder]
             start_s = time.perf_counter()
             process = subprocess.Popen(
-                words, env=os.environ | {"DISPLAY": name}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                words, env=surroundings(which) | {"DISPLAY": name}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
             )
             wait_for(lambda: windows() or process.poll() is not None, "no window")
             taken_s = time.perf_counter() - start_s
@@ -168,7 +187,7 @@ def test_the_start_window_stands(tmp_path: Path, soak: Soak) -> None:
             wait_for(lambda: not windows(), "the window stays")
             return taken_s
 
-        run("new", RECOIL)  # warm
+        run("new")  # warm
         times = median_times(7, run)
         looks.close()
     soak("the console's start window", said(times), "1.2 s", "medians of 7 turns in one run, from the command on, warm")

@@ -194,7 +194,7 @@ def _draw_collision(axes: Axes, panel: ShotPanel) -> None:
     arrow = {"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
     if tip > 0.05 * (top - bottom):
         axes.annotate("", xy=(end_s * 1e3, tip), xytext=(end_s * 1e3, 0.0), arrowprops=arrow)
-    text = f"collision\n{panel.collision_force_N:.3g} N{cut}\n($x_k$ = {panel.contact_depth_m * 1e3:g} mm)"
+    text = f"collision\n{panel.collision_force_N:.3g} N{cut}\n(xₖ = {panel.contact_depth_m * 1e3:g} mm)"
     to_the_left = _share(axes, end_s * 1e3) > 0.5
     axes.annotate(
         text,
