@@ -158,18 +158,20 @@ def has_come_to_creep(p: Constants, s: ShotState, w: StepSeries, rate: float) ->
     What is apart fades, and must be gone when the magnet arrives or the drive changes. It also shifts the position,
     which is known but for what the position itself changes meanwhile.
     """
-    apart = max(size_ratio(w.v[0] - s.v, abs(w.v[0])), size_ratio(w.i[0] - s.i, abs(w.i[0])))
+    apart_v, apart_i = size_ratio(w.v[0] - s.v, abs(w.v[0])), size_ratio(w.i[0] - s.i, abs(w.i[0]))
+    apart = max(apart_v, apart_i)
     ahead, hold = s.x if s.heading < 0.0 else p.coil_reach - s.x, grip(p, s.x)
     changes = s.drive_until - s.time if s.drive_until < HORIZON_S else math.inf  # nobody asks how it moves at the end
     soonest = min(how_long(ahead, abs(s.v)), changes)
     slowest = min(how_long(min(s.x, ahead), abs(s.v)), how_long(1.0, rate))
-    times, products = settling_rate(p, hold) * slowest, braking_rate(p, hold) * slowest
-    fading = fading_rate(p, hold)
+    settling, fading, products = settling_rate(p, hold), fading_rate(p, hold), braking_rate(p, hold) * slowest
+    times = settling * slowest
     shifts = min(0.1 * _APART * times * times, _ANYWAY)
     if s.heading < 0.0:  # what the hold changes by until all has faded, times the shift
         shifts = max(shifts, 2.0 * _APART * times * fading * slowest)
     gone = apart <= _APART * math.exp(min(fading * soonest, 30.0))
-    return gone and apart <= min(shifts, math.sqrt(_APART * products), s.farthest)
+    swing = max(apart_v, apart_i * max(1.0, 0.5 * settling / fading))  # of the speed, whatever the ring's phase
+    return gone and swing <= s.farthest and apart <= min(shifts, math.sqrt(_APART * products))
 
 
 def span_from_where_it_goes(p: Constants, s: ShotState, w: StepSeries, span: float) -> float:

@@ -27,8 +27,9 @@ MAX_WORK = 65_000
 """The most work of one shot: its segments, passes over series that settle, and pieces of steps in which roots are
 looked for. It takes about a second, interpreted; a plain shot has about 30."""
 
-FARTHEST = 0.1
-"""How far apart, relative, speed and current may be from those that follow the position as they are taken for them."""
+FARTHEST = 0.5
+"""How far the speed may swing about the one that follows the position, relative, as it is taken for that: at less than
+1 the magnet does not turn meanwhile."""
 
 FULL, NO_INDUCTANCE, CLOSED_FORM, BALLISTIC = range(4)
 """The models; those without inductance have L = 0 among their constants."""

@@ -9,6 +9,9 @@ choice of the step from the last two coefficients (section 3).
     (n + 1) v[n+1] = h/m (k_m (g i)[n] - k x[n]  + at n = 0: friction - k x_0)
     (n + 1) i[n+1] = h/L (at n = 0: u  - R i[n] - k_e v[n])          or, reciprocal, k_e (g v)[n];  h: the step
 
+There (g v)[n] = g[0] v[n] + (n + 1)/(2 h) (the sum of x[j] g[n + 1 - j], 0 < j <= n), as v is the derivative of x. In
+that sum x[a] g[b] = x[b] g[a], so it takes half the terms of a product.
+
 The product (g i)[n] is a sum of n + 1 terms. As a loop in a loop its bookkeeping costs more than its arithmetic:
 interpreted two thirds of the time, compiled a third. So the text of the function is made here, once, for `ORDER`.
 
@@ -46,9 +49,10 @@ def _of_gun(name: str, lines: Callable[[], Iterable[str]]) -> Any:
 def _expansion(*, reciprocal: bool) -> list[str]:
     """The series from their first coefficients."""
     lines = ["per_inductance, v0, i0 = h / p.inductance, v[0], i[0]"]
+    lines += ["held, moved = emf * g0, 0.5 * emf / h"] if reciprocal else []
     for n in range(ORDER):
-        seen = f"({_product('g', 'v', n)})" if reciprocal else f"v{n}"
-        current = f"({_first(n, 'u ')}- R * i{n} - emf * {seen}) * per_inductance * {1.0 / (n + 1)!r}"
+        seen = f"- held * v{n}{_moved(n)}" if reciprocal else f"- emf * v{n}"
+        current = f"({_first(n, 'u ')}- R * i{n} {seen}) * per_inductance * {1.0 / (n + 1)!r}"
         lines += [*_position(n), _speed(n), f"i{n + 1} = i[{n + 1}] = {current}"]
     return lines
 
@@ -116,6 +120,15 @@ def _product(a: str, b: str, n: int) -> str:
     middle = [f"{a}{half} * {b}{half}"] if n % 2 == 0 else []
     pairs = [f"({a}{n - j} * {b}{j} + {a}{j} * {b}{n - j})" for j in range(half - 1, -1, -1)]
     return " + ".join([*middle, *pairs])
+
+
+def _moved(n: int) -> str:
+    """What the back-EMF's n-th coefficient loses as the hold changes over the step."""
+    half = (n + 2) // 2
+    twice = " + ".join(f"x{n + 1 - j} * g{j}" for j in range(half - 1, 0, -1))
+    sums = [f"x{half} * g{half}"] if n % 2 == 1 else []
+    sums += [f"2.0 * ({twice})"] if twice else []
+    return f" - moved * {n + 1}.0 * ({' + '.join(sums)})" if sums else ""
 
 
 def _product_before(b: str, n: int) -> str:
