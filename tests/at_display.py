@@ -28,7 +28,7 @@ needs_display = pytest.mark.skipif(not READY, reason="needs Xvfb and openbox")
 HAND_S = 1.5 * BOUNCE_S
 """A hand takes longer from what it sees to a press: a key that goes down again sooner has bounced."""
 OTHER = "another program's window"
-_RIGHT_BUTTON = 3
+RIGHT_BUTTON = 3
 _NO_DOUBLE_S = 0.6
 """Two clicks that far apart are none double."""
 BUSY = ("saving", "firing", "stopped")
@@ -152,7 +152,7 @@ class AtDisplay:
         for x, y in places:
             xtest.fake_input(display, X.MotionNotify, x=x, y=y)
             for event in (X.ButtonPress, X.ButtonRelease):
-                xtest.fake_input(display, event, _RIGHT_BUTTON)
+                xtest.fake_input(display, event, RIGHT_BUTTON)
             display.sync()
 
     @contextmanager
@@ -352,33 +352,18 @@ class AtConsole(AtDisplay):
         self.keys.click(*middle(self.look(), name))
 
     @contextmanager
-    def button_down(self, name: str) -> Iterator[None]:
-        """The mouse's button goes down on a command's, and is let go at the end."""
+    def button_down(self, name: str, mouse: int = 1) -> Iterator[None]:
+        """A button of the mouse goes down on a command's, and is let go at the end."""
         from Xlib import X
         from Xlib.ext import xtest
 
         x, y = middle(self.look(), name)
         display = self.keys.display
         xtest.fake_input(display, X.MotionNotify, x=x, y=y)
-        xtest.fake_input(display, X.ButtonPress, 1)
+        xtest.fake_input(display, X.ButtonPress, mouse)
         display.sync()
         yield
-        xtest.fake_input(display, X.ButtonRelease, 1)
-        display.sync()
-
-    @contextmanager
-    def right_button_down(self, name: str) -> Iterator[None]:
-        """The mouse's right button is held, from where it went down on a command's."""
-        from Xlib import X
-        from Xlib.ext import xtest
-
-        x, y = middle(self.look(), name)
-        display = self.keys.display
-        xtest.fake_input(display, X.MotionNotify, x=x, y=y)
-        xtest.fake_input(display, X.ButtonPress, _RIGHT_BUTTON)
-        display.sync()
-        yield
-        xtest.fake_input(display, X.ButtonRelease, _RIGHT_BUTTON)
+        xtest.fake_input(display, X.ButtonRelease, mouse)
         display.sync()
 
     def stop(self, reason: str = "enough") -> tuple[int, str]:

@@ -16,6 +16,7 @@ import pytest
 from tests.at_display import (
     HAND_S,
     OTHER,
+    RIGHT_BUTTON,
     AtConsole,
     AtDisplay,
     another_window,
@@ -167,23 +168,21 @@ def test_what_stops_does_so_as_its_button_goes_down(
         assert screen.look().state == state
 
 
-@pytest.mark.parametrize(("name", "state"), [("emergency", "halted"), ("pause", "paused")])
+@pytest.mark.parametrize(("held", "mouse"), [(RIGHT_BUTTON, 1), (1, RIGHT_BUTTON)])
 def test_what_stops_is_heard_beside_a_button_of_the_mouse_that_is_held_elsewhere(
-    quick_configs: Path, tmp_path: Path, display: str, name: str, state: str
+    quick_configs: Path, tmp_path: Path, display: str, held: int, mouse: int
 ) -> None:
-    with (
-        in_a_train(quick_configs, tmp_path, display) as screen,
-        screen.right_button_down("next"),
-        screen.button_down(name),
-    ):
-        screen.until(lambda look: look.state == state)
+    with in_a_train(quick_configs, tmp_path, display) as screen, screen.button_down("next", held):
+        for name, state in (("pause", "paused"), ("emergency", "halted")):
+            with screen.button_down(name, mouse):
+                screen.until(lambda look, state=state: look.state == state)
 
 
 @pytest.mark.parametrize(("name", "state"), [("emergency", "halted"), ("pause", "paused")])
 def test_what_stops_does_so_by_the_wrong_button_of_the_mouse_too(
     quick_configs: Path, tmp_path: Path, display: str, name: str, state: str
 ) -> None:
-    with in_a_train(quick_configs, tmp_path, display) as screen, screen.right_button_down(name):
+    with in_a_train(quick_configs, tmp_path, display) as screen, screen.button_down(name, RIGHT_BUTTON):
         screen.until(lambda look: look.state == state)
 
 

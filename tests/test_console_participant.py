@@ -15,7 +15,16 @@ from string import ascii_lowercase
 
 import pytest
 
-from tests.at_display import AtConsole, AtDisplay, check_disarmed, needs_display, records, remarks, virtual_display
+from tests.at_display import (
+    AtConsole,
+    AtDisplay,
+    check_disarmed,
+    needs_display,
+    records,
+    remarks,
+    taken_keyboard,
+    virtual_display,
+)
 from tests.at_runs import DIRECTION, PREFERENCE, RUN, rows, words
 from tests.waiting import stand_still, wait_for
 from tests.warm_start import warm
@@ -242,6 +251,25 @@ def test_on_one_screen_a_question_for_the_participants_keys_is_seen_until_it_is_
         screen.keys.press("Down")
         screen.to("asking", trial=3)
         seen(screen, PARTICIPANT)
+        is_stopped_by_f12(screen)
+
+
+@pytest.mark.parametrize("is_clicked", [True, False])
+def test_a_train_does_not_go_on_while_another_program_has_the_keyboard_whosever_window_has_the_focus(
+    is_clicked: bool, quick_configs: Path, tmp_path: Path, display: str
+) -> None:
+    run = words(quick_configs, "preference", "--participant", "P01", "--participant-screen")
+    with AtConsole(run, tmp_path, display) as screen:
+        screen.stands(RUN)
+        screen.to("train", trial=1)
+        if not is_clicked:
+            screen.focus_on(PARTICIPANT)
+            screen.until(lambda look: look.says("Keys: the participant's screen"))
+        with taken_keyboard(display):
+            if is_clicked:
+                screen.focus_on(PARTICIPANT)
+            screen.until(lambda look: look.state == "paused" and look.says("ANOTHER WINDOW"))
+        screen.until(lambda look: look.says("Keys: the participant's screen"))  # which has them again
         is_stopped_by_f12(screen)
 
 

@@ -267,6 +267,27 @@ def test_a_train_fires_nothing_while_the_keys_are_elsewhere(away_s: float, goes_
         assert sitting.gun.words.count("rendered") == fired + goes_on
 
 
+@pytest.mark.parametrize(("state", "event"), [(S.TRAIN, None), (S.REARMING, events.Rearm(held_s=1.0))])
+def test_nothing_is_fired_behind_keys_that_were_elsewhere_since_they_were_to_fire(
+    state: State, event: Event | None, tmp_path: Path
+) -> None:
+    """They are here again before the next shot of a train, or at the end of the hold of a test shot; F12 was not."""
+    with sat_at(state, tmp_path) as sitting:
+        looks(sitting, 3)
+        fired = sitting.gun.words.count("rendered")
+        for _ in range(7):
+            sitting.live.beats.beat(heard=False)
+            sitting.clock.skip(0.1)
+        looks(sitting, 2)
+        if event is not None:
+            assert by_hand(sitting, event)
+        looks(sitting, 10)
+        sitting.settle()
+        assert sitting.gun.words.count("rendered") == fired
+        assert sitting.position.why == KEYS_ELSEWHERE
+        assert sitting.gun.words[-1] == "disarmed"
+
+
 @pytest.mark.parametrize("heard", [True, False])
 def test_a_click_from_another_window_fires_at_once_if_it_gives_the_console_the_keys(
     heard: bool, tmp_path: Path

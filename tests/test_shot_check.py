@@ -19,6 +19,7 @@ from experiments.run_request import RunRequest
 from experiments.screens.console import shot_check
 from experiments.screens.console.shot_check import HUNG, ShotCheck, ShotProgress, report_text, state_text
 from experiments.screens.synthetic import synthetic_screen
+from experiments.session.judging import Beats
 
 pytestmark = pytest.mark.slow
 
@@ -117,6 +118,34 @@ def test_a_countdown_in_which_the_console_stood_still_fires_nothing(monkeypatch:
     assert (over.fired, bench.words) == (False, ["disarm", "status", "close"])
 
 
+@pytest.mark.parametrize("was_elsewhere", [False, True])
+def test_nothing_is_fired_where_the_keys_were_elsewhere_in_the_countdown(
+    monkeypatch: pytest.MonkeyPatch, was_elsewhere: bool
+) -> None:
+    """They are here again at its end; F12 was pressed before and not heard."""
+    bench, later_s = Bench(monkeypatch, countdown_s=1), [0.0]
+    now = bench.clock.now
+    bench.check.beats = Beats(lambda: now() + later_s[0])
+
+    def counting() -> None:
+        for _ in range(7):
+            bench.check.beats.beat(heard=not was_elsewhere)
+            later_s[0] += 0.1
+        threading.Thread(target=beat, args=[bench], daemon=True).start()
+
+    bench.at["counting"] = counting
+    over = bench.carry_out()
+    assert over.fired is not was_elsewhere
+    assert over.text.startswith(HUNG) is was_elsewhere
+
+
+def beat(bench: Bench, *, heard: bool = True) -> None:
+    """The window looks at its keys until the end."""
+    while bench.told[-1].phase != "over":
+        bench.check.beats.beat(heard=heard)
+        threading.Event().wait(0.02)
+
+
 @pytest.mark.parametrize(("blocked_s", "heard", "fires"), [(0.0, True, True), (0.7, True, False), (0.0, False, False)])
 def test_nothing_is_fired_while_the_window_does_not_look_at_its_keys(
     monkeypatch: pytest.MonkeyPatch, blocked_s: float, heard: bool, fires: bool
@@ -130,12 +159,7 @@ def test_nothing_is_fired_while_the_window_does_not_look_at_its_keys(
         bench.check.beats.beat()
         later_s[0] = blocked_s  # and no beat comes any more
         if not blocked_s:
-            threading.Thread(target=beat, daemon=True).start()
-
-    def beat() -> None:
-        while bench.told[-1].phase != "over":
-            bench.check.beats.beat(heard=heard)  # or another window has the keys
-            threading.Event().wait(0.02)
+            threading.Thread(target=beat, args=[bench], kwargs={"heard": heard}, daemon=True).start()
 
     bench.at["counting"] = counting
     over = bench.carry_out()

@@ -345,11 +345,9 @@ def resolve_bypred(*_): return [1, 2]
 """A library of markers that takes its time to start."""
 
 
-@needs_manager
-def test_f12_while_markers_are_starting_halts_the_run_as_it_begins(
-    pilot: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    journal = pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl"
+@contextmanager
+def while_markers_start(pilot: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[AtDisplay]:
+    """As a run of P02 is to begin."""
     (pilot / "fake").mkdir()
     (pilot / "fake" / "pylsl.py").write_text(SLOW_MARKERS)
     monkeypatch.setenv("PYTHONPATH", f"{pilot / 'fake'}{os.pathsep}{ROOT}")
@@ -361,6 +359,28 @@ def test_f12_while_markers_are_starting_halts_the_run_as_it_begins(
         begin_another(screen, "P02")
         wait_until(lambda: "please wait" in screen.keys.title_at(640, 400))
         time.sleep(10 * HAND_S)  # the window manager gives it the keys
+        yield screen
+
+
+@needs_manager
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=["TERM", "INT"])
+def test_a_signal_while_markers_are_starting_ends_the_program_and_begins_no_run(
+    pilot: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    with while_markers_start(pilot, monkeypatch) as screen:
+        screen.process.send_signal(number)
+        code, said = screen.end()
+    assert code == 130
+    assert "Traceback" not in said
+    assert not (pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl").exists()
+
+
+@needs_manager
+def test_f12_while_markers_are_starting_halts_the_run_as_it_begins(
+    pilot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = pilot / LONG / "sub-P02" / "sub-P02_task-direction_journal.jsonl"
+    with while_markers_start(pilot, monkeypatch) as screen:
         screen.keys.press("F12")
         wait_until(lambda: bool(remarks(journal)))
         assert [one["kind"] for one in remarks(journal)] == ["halted"]

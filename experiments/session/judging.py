@@ -46,6 +46,7 @@ class Beats:
         self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
         self._lately: tuple[float, ...] = ()
         self._late_s = self._deaf_s = math.inf
+        self._was_deaf_s = -math.inf
 
     def beat(self, *, heard: bool = True) -> None:
         """The timer beats; `heard`: what is pressed comes here.
@@ -53,6 +54,7 @@ class Beats:
         The time is read once: wherever this itself stands still, the next beat is late.
         """
         now_s = self._now()
+        self._note_deaf(self._last_s if heard else now_s)
         self._deaf_s = math.inf if heard else min(self._deaf_s, now_s)
         self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
         self._last_s = now_s
@@ -63,7 +65,13 @@ class Beats:
 
     def hear(self) -> None:
         """A key came here, or would have: so what is pressed is heard."""
+        self._note_deaf(self._last_s)
         self._deaf_s = math.inf
+
+    def _note_deaf(self, last_s: float) -> None:
+        """If what is pressed has gone elsewhere for a while, it did so until then at the least."""
+        if self.is_deaf:
+            self._was_deaf_s = last_s
 
     @property
     def prompt(self) -> bool:
@@ -79,6 +87,10 @@ class Beats:
     def is_deaf(self) -> bool:
         """Whether what is pressed has gone elsewhere for a while."""
         return self._now() - self._deaf_s > DEAF_S
+
+    def was_deaf_since(self, since_s: float) -> bool:
+        """Whether that was so at any time from then on: F12 may have been pressed and not heard."""
+        return self.is_deaf or self._was_deaf_s > since_s
 
     @property
     def alive_since_s(self) -> float:

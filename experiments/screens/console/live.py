@@ -320,7 +320,7 @@ Made = TypeVar("Made")
 def while_shown(text: str, make: Callable[[], Made], emergency: Callable[[], None] = lambda: None) -> Made:
     """What `make` gives back, done in a thread of its own while a window shows the text. Raises what it raises.
 
-    `emergency` is told of F12, as is whoever pressed it.
+    `emergency` is told of F12, as is whoever pressed it. `KeyboardInterrupt` behind it if a signal came meanwhile.
     """
     shown = QLabel(text)
     shown.setWindowTitle("Recoil – please wait")
@@ -345,6 +345,9 @@ def while_shown(text: str, make: Callable[[], Made], emergency: Callable[[], Non
     shown.show()
     threading.Thread(target=work, daemon=True, name="waiting").start()
     look.start(_LOOK_MS)
-    loop.exec()
+    with signals_to(lambda _: None) as signalled:
+        loop.exec()
     shown.close()
+    if signalled:  # once it is made: whoever made room for it closes it
+        raise KeyboardInterrupt(signalled[0])
     return made.result()

@@ -103,8 +103,7 @@ class KeepsKeys(_OverAll):
 
     def _stops(self, event: QtCore.QEvent) -> bool:
         """Whether a press beside a held button of the mouse was on what stops: Qt gives it to what that is held on."""
-        left = QtCore.Qt.MouseButton.LeftButton
-        if not isinstance(event, QMouseEvent) or event.button() != left or event.buttons() == left:
+        if not isinstance(event, QMouseEvent) or event.buttons() == event.button():
             return False
         under = QApplication.widgetAt(event.globalPosition().toPoint())
         if not isinstance(under, ConsoleButton) or not under.stops or under.window() is not self._window.window():

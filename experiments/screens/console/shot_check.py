@@ -155,7 +155,8 @@ class ShotCheck:
         give_up_s = self._clock.now() + STANDSTILL_S
         while not self.beats.prompt and self._clock.now() < give_up_s and not self._off.wait(_LOOK_S):
             pass
-        return self.beats.prompt and not self.beats.is_deaf and self.beats.alive_since_s <= began_s
+        heard = not self.beats.was_deaf_since(began_s) and self.beats.alive_since_s <= began_s
+        return self.beats.prompt and heard
 
     def _disarmed(self, gun: Gun) -> GunStatus | None:
         """The state read back from the gun once it was told to disarm; `None` if it does not say."""
@@ -258,7 +259,7 @@ class ShotPage(QWidget):
             TextLines("detail", most_lines=9),
         )
         self.count.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape)
+        self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape, clicked=self._clicked)
         self.call_off_button.went_down.connect(self._call_off_at_once)
         self.call_off_button.stops = True
         self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
@@ -390,12 +391,16 @@ class ShotPage(QWidget):
         self._calls_off = self.is_running
         self.call_off()
 
-    def _escape(self) -> None:
+    def _clicked(self) -> None:
         """Go back, but not by the press that called off: what came of that is still to be read."""
         before, self._calls_off = self._calls_off, False
+        if not before:
+            self._escape()
+
+    def _escape(self) -> None:
         if self.is_running:
             self.call_off()
-        elif not before:
+        else:
             self.left.emit()
 
     def _take(self, told: ShotProgress) -> None:

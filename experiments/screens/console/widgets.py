@@ -139,11 +139,19 @@ class ConsoleButton(QtWidgets.QPushButton):
 
 
 def button(
-    parent: QtWidgets.QWidget, text: str, key: str, slot: Slot, *, name: str = "", at_once: bool = False
+    parent: QtWidgets.QWidget,
+    text: str,
+    key: str,
+    slot: Slot,
+    *,
+    name: str = "",
+    at_once: bool = False,
+    clicked: Slot | None = None,
 ) -> ConsoleButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen.
 
-    `at_once`: what stops acts as the button goes down, the others as it is let go.
+    `at_once`: what stops acts as the button goes down, the others as it is let go. `clicked` is what that does where it
+    is not what the key does.
     """
     made = ConsoleButton(f"{text}  [{key.replace('Return', 'Enter')}]")
     made.setObjectName(name)
@@ -153,7 +161,7 @@ def button(
     if at_once:
         made.went_down.connect(slot)
     else:
-        made.clicked.connect(lambda _: slot())
+        made.clicked.connect(lambda _: (clicked or slot)())
 
     def pressed() -> None:
         if made.isVisible():

@@ -13,6 +13,8 @@ _NO_WINDOW = 1
 """Up to this X means nobody, or whoever is under the pointer."""
 _CODES = range(8, 256)
 """The numbers that keys have on X."""
+_WHILE_GRABBED = 3
+"""How X says that the focus came while another program has the keyboard."""
 _ICONIC = 3
 """What a window manager on X says of a window that is minimised, or lies on another desktop."""
 
@@ -23,10 +25,24 @@ class Focus:
     def __init__(self, window: Any) -> None:
         self._window = window
         self._lender = 0
+        self.grabbed = False
+        """Whether the keys go to another program that has grabbed the keyboard, though the window has the focus."""
         if self._on_x:  # pyglet asks for it on another connection: a key that is held would be let go at each repeat
             from pyglet.window import xlib as xlib_window  # noqa: PLC0415 - where there is no X, it cannot be imported
 
             xlib_window.XkbSetDetectableAutoRepeat(window._x_display, 1, byref(c_int()))
+            self._note_grabs()
+
+    def _note_grabs(self) -> None:
+        """X says of a focus that comes whether that is so; pyglet does not pass it on."""
+        handlers, came = self._window._event_handlers, _xlib().FocusIn
+        activate = handlers[came]
+
+        def note(event: Any) -> None:
+            self.grabbed = event.xfocus.mode == _WHILE_GRABBED
+            activate(event)
+
+        handlers[came] = note
 
     def take(self) -> None:
         """Take the keys and come to the front, and keep in mind whose they were."""

@@ -265,7 +265,7 @@ class _Handlers:
     def on_activate(self) -> None:
         self._stage.focus.find_held()
         self.hear_new_keys()
-        self._stage.unasked.append(messages.Focused(on=True))
+        self._stage.unasked.append(messages.Focused(on=not self._stage.focus.grabbed))
 
     def on_deactivate(self) -> None:
         self._stage.unasked.append(messages.Focused(on=False))
