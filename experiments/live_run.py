@@ -126,7 +126,7 @@ class LiveRun:
         self.halted = self.halt_unsaved = self.correction_unsaved = False
         self._answer_unsaved = ""
         self._lost_halt: Halted | None = None
-        self.beats, self._to_fire_s = Beats(clock.now), math.inf
+        self.beats, self._to_fire_s, self._held_s = Beats(clock.now), math.inf, 0.0
         self.gun_silence = ""
         """Why the gun does not answer, as whoever looks at it meanwhile has seen it last; empty if it does."""
         self.minimised = False
@@ -195,7 +195,8 @@ class LiveRun:
         self._position = judging.moved(moment, event)
         self.halted = self.halted or self._position.base is State.HALTED
         if isinstance(event, events.Fire | events.Rearm):
-            self._to_fire_s = moment.now_s - ((event.held_s or 0.0) if isinstance(event, events.Rearm) else 0.0)
+            self._to_fire_s = moment.now_s
+            self._held_s = (event.held_s or 0.0) if isinstance(event, events.Rearm) else 0.0
         if isinstance(event, DISARMS) and (before.base in ARMED or isinstance(event, events.EmergencyStop)):
             self._disarm_beside()
         if before.paused_s is not None and self._position.paused_s is None:
@@ -305,7 +306,7 @@ class LiveRun:
             self.offer(events.Pause(cause=judging.STOOD_STILL))
         elif self.beats.hears_late:
             self.offer(events.Pause(cause=judging.HEARS_LATE))
-        elif self.beats.was_deaf_since(self._to_fire_s):
+        elif self.beats.was_deaf_since(self._to_fire_s - self._held_s):
             self.offer(events.Pause(cause=judging.KEYS_ELSEWHERE))
         self.allow_shot()
         return self.beats.prompt
