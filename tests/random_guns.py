@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,14 @@ def drawn(rng: np.random.Generator, count: int, *, factor: float) -> dict[str, N
 
 def shot_alone(gun: GunParameters, arrays: Mapping[str, Any]) -> ShotBatch:
     """The same guns as `simulate_batch`, in batches too small for lanes."""
+    return by_few(partial(simulate_batch, gun), arrays)
+
+
+def by_few(batch: Callable[..., Any], arrays: Mapping[str, Any]) -> ShotBatch:
+    """Guns in batches too small for lanes, by `simulate_batch` of any version."""
     count = len(next(iter(arrays.values())))
     few = [
-        simulate_batch(gun, cores=1, **{name: column[start : start + ALONE] for name, column in arrays.items()})
+        batch(cores=1, **{name: column[start : start + ALONE] for name, column in arrays.items()})
         for start in range(0, count, ALONE)
     ]
     columns = {one.name: np.concatenate([getattr(batch, one.name) for batch in few]) for one in fields(ShotBatch)}

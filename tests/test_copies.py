@@ -1,6 +1,7 @@
 """Work in copies of this process: what it writes is there at the end, what goes wrong in it is told."""
 
 import os
+import select
 import signal
 import time
 from pathlib import Path
@@ -11,7 +12,7 @@ from analysis.report import copies as module
 from analysis.report.copies import cores, in_copy, process_copies
 from analysis.report.terminal import Tell
 from device.messages import RecoilError
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no copies of a process on this system")
 
@@ -103,6 +104,25 @@ def test_who_is_interrupted_leaves_no_copy(tmp_path: Path) -> None:
         interrupted()
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
+def test_a_copy_ends_with_the_process_that_began_it(tmp_path: Path) -> None:
+    """Else it would go on with what somebody begins anew."""
+
+    def work(_: Tell) -> None:
+        (tmp_path / "begun").write_text(str(os.getpid()))
+        time.sleep(PATIENCE_S)
+
+    first = os.fork()
+    if first == 0:
+        with process_copies():
+            in_copy(work)
+    wait_for(lambda: (tmp_path / "begun").exists() and (tmp_path / "begun").read_text())
+    copy = os.pidfd_open(int((tmp_path / "begun").read_text()))
+    os.kill(first, signal.SIGKILL)
+    os.waitpid(first, 0)
+    assert select.select([copy], [], [], PATIENCE_S / 2)[0]
+    os.close(copy)
 
 
 def test_cores_are_those_that_this_process_may_use() -> None:

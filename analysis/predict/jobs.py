@@ -9,20 +9,18 @@ it was worked out, so the caller puts it in order by its number. Each is handed 
 from __future__ import annotations
 
 import logging
-import os
 import re
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from typing import Any
 
-from analysis.report.copies import no_interrupt
+from analysis.report.copies import end_with_parent, no_interrupt
 from device.messages import said_by
 from experiments.config.door import ConfigError
 from experiments.record.provenance import recoil_version, versions
@@ -101,14 +99,7 @@ def _on_cluster(client: Any, function: Function, pieces: Sequence[Any], done: Do
 def _begin_worker() -> None:
     """A worker does not outlive a parent that was killed; on Windows it ignores Ctrl-C only from here on."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    end_with_parent()
 
 
 def _cluster(address: str) -> Any:

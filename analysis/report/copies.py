@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
@@ -85,8 +85,9 @@ def _begin(work: Work, tell: Tell) -> _Copy:
 
 
 def _work(work: Work, end: Connection) -> None:
-    """In the copy: what a signal means is the first process's affair, which ends its copies."""
+    """In the copy: what a signal means is the first process's affair, which ends its copies, or ends with them."""
     _AT_WORK.set(None)
+    end_with_parent()
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
     try:
@@ -95,6 +96,18 @@ def _work(work: Work, end: Connection) -> None:
         end.send(_as_sent(error))
     else:
         end.send(None)
+
+
+def end_with_parent() -> None:
+    """Have this process end with the one that began it, also if that is killed: whoever begins anew would meet it."""
+    parent = parent_process()
+
+    def end() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=end, daemon=True).start()
 
 
 def _as_sent(error: Exception) -> Exception:
