@@ -56,12 +56,16 @@ def test_what_would_be_done_unseen_takes_the_page_away_and_is_done_by_the_next_p
         assert sitting.position != before or sitting.controls.typing.line
 
 
-def test_a_test_shot_that_is_held_for_is_called_off_by_a_page(tmp_path: Path) -> None:
+@pytest.mark.parametrize("keys", [["F1"], ["P"], ["N"], ["F1", "Esc"]], ids="+".join)
+def test_a_test_shot_that_is_held_for_is_called_off_by_whatever_else_is_pressed(
+    keys: list[str], tmp_path: Path
+) -> None:
     with sat_at(S.REARMING, tmp_path) as sitting:
         sitting.ready()
         sitting.window.down("T")
         sitting.look_for(0.3)
-        under_a_page(sitting)
+        for key in keys:
+            sitting.press(key)
         sitting.look_for(2.0)
         sitting.settle()
         assert sitting.position.base is S.REARMING

@@ -40,6 +40,7 @@ from experiments.screens.console.form import Opening, PeopleTable
 from experiments.screens.console.live import study_of
 from experiments.screens.console.shot_check import HUNG
 from experiments.screens.console.start import NOTHING_ARMED, StartWindow
+from experiments.screens.console.windows import FreshShortcuts
 from experiments.screens.synthetic import synthetic_screen
 from experiments.study import enrolment, register
 from experiments.study.folders import PlaceError, StudyFolder, open_study, place
@@ -71,9 +72,13 @@ Open = Callable[..., StartWindow]
 
 
 @pytest.fixture
-def opened(study: StudyFolder) -> Iterator[Open]:
-    """Opens start windows, with a real gun's address unless told otherwise; none opens the gun before a test shot."""
+def opened(study: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
+    """Opens start windows, with a real gun's address unless told otherwise; none opens the gun before a test shot.
+
+    What came of a shot is read at once.
+    """
     windows: list[StartWindow] = []
+    monkeypatch.setattr(shot_check, "READ_S", -1.0)
 
     def open_(**how: Any) -> StartWindow:
         window = StartWindow(study, Opening(**{"gun": SERIAL} | how), RealClock())
@@ -1089,6 +1094,36 @@ def test_a_double_click_on_the_button_of_the_test_shot_neither_stops_it_nor_call
     QTest.mouseClick(under, Qt.MouseButton.LeftButton, pos=under.mapFrom(window, place))
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == "Fired"
+
+
+@pytest.mark.parametrize("by_mouse", [False, True])
+def test_a_press_to_call_off_that_comes_behind_the_shot_leaves_what_came_of_it_to_be_read(
+    opened: Open, monkeypatch: pytest.MonkeyPatch, by_mouse: bool
+) -> None:
+    monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
+    window = opened(gun="simulated")
+    for read_s, page in ((1e9, 1), (-1.0, 0)):
+        monkeypatch.setattr(shot_check, "READ_S", read_s)
+        if not window.pages.currentIndex():
+            key(window, "T", CTRL)
+            until(lambda: window.shots.title.text() == "Fired" and not window.shots.is_running)
+        if by_mouse:
+            QTest.mouseClick(window.shots.call_off_button, Qt.MouseButton.LeftButton)
+        else:
+            key(window, "Escape")
+        assert window.pages.currentIndex() == page
+
+
+@pytest.mark.parametrize(("apart_s", "taken"), [(0.0, True), (0.3, False)])
+def test_a_repeat_that_a_busy_machine_tells_as_a_new_press_is_none_of_a_key_that_went_down_unseen(
+    opened: Open, monkeypatch: pytest.MonkeyPatch, apart_s: float, taken: bool
+) -> None:
+    """Esc that calls a test shot off is taken before shortcuts see it."""
+    fresh = FreshShortcuts(opened())
+    for kind, at_s, kept in (("KeyRelease", 5.0, False), ("ShortcutOverride", 5.0 + apart_s, taken)):
+        monkeypatch.setattr("experiments.screens.console.windows.machine_s", lambda at_s=at_s: at_s)
+        event = QKeyEvent(getattr(QEvent.Type, kind), Qt.Key.Key_Escape, Qt.KeyboardModifier.NoModifier)
+        assert fresh.eventFilter(None, event) is kept
 
 
 @pytest.mark.parametrize(("name", "title"), [("stop_button", "EMERGENCY STOP"), ("call_off_button", "Not fired")])

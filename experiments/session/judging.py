@@ -30,8 +30,9 @@ _SETTLED = 3
 """So many beats in time after that, and what was pressed meanwhile has come."""
 _PROMPT_S = 0.3
 """Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
-DEAF_S = 0.5
-"""Nor while another window has the keys for so long; they pass from window to window in less (assumed)."""
+DEAF_S = 0.4
+"""Nor while another window has the keys for so long, looked at every 0.1 s: for half a second, or it may be a little
+less. They pass from window to window in 0.3 s (assumed)."""
 _LATE_S = 3.0
 """Nor does anything if that goes on for so long, and the experimenter is told (assumed)."""
 

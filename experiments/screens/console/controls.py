@@ -161,8 +161,6 @@ class Controls:
         """Look whether it was held for long enough, and whether a line or a page takes what is typed `here`."""
         if self._participant is not None:
             self._participant.covered = here and self.covered
-        if self.page:
-            self.let_go()
         press, hold = self._held or (None, None)
         if hold is not None and (held_s := hold.held_s(self._clock.now())) >= REARM_HELD_S:
             self._held = None
@@ -175,7 +173,8 @@ class Controls:
         self.do(name, press)
 
     def do(self, name: keys.Name, press: Press) -> None:
-        """Carry out a command."""
+        """Carry out a command; a test shot that is held for meanwhile is not what was meant."""
+        self.let_go()
         match name:
             case "emergency":
                 self._offer(events.EmergencyStop())

@@ -382,10 +382,6 @@ class Presses:
         """
         return key not in self._down and self._ups.get(key) == number
 
-    def is_down(self, key: str) -> bool:
-        """Whether a key is down."""
-        return key in self._down
-
     def lost(self) -> set[str]:
         """The window has lost the keys: what was down, which may be let go unseen."""
         were, self._down = self._down, set()

@@ -6,6 +6,7 @@ before it fires, so that nothing of this test fires after it, whatever the gun d
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
@@ -38,6 +39,8 @@ from experiments.session.judging import STANDSTILL_S, Beats
 COUNTDOWN_S = 3
 HUNG = phrase("The console did not hear its keys all through the countdown: nothing was fired.")
 _BEAT_MS, _LOOK_S = 100, 0.02
+READ_S = 0.5
+"""What is pressed so soon after a shot was meant for the countdown: what came of it is still to be read (assumed)."""
 SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
 
@@ -241,7 +244,7 @@ class ShotPage(QWidget):
         self._keeper = DebtKeeper(results, self.unkept.emit)
         self._debt: OwedShot | None = None
         self._method_at = 0
-        self._calls_off = False
+        self._calls_off, self._fired_s = False, -math.inf
         self.over: Callable[[], None] = lambda: None
         self._gun_name = self._unkept = self._why = ""
         self._shown_detail = ("", "wait")
@@ -400,7 +403,7 @@ class ShotPage(QWidget):
     def _escape(self) -> None:
         if self.is_running:
             self.call_off()
-        else:
+        elif self._clock.now() - self._fired_s > READ_S:
             self.left.emit()
 
     def _take(self, told: ShotProgress) -> None:
@@ -425,7 +428,7 @@ class ShotPage(QWidget):
         self._check, why, self._why = None, self._why, ""
         if told.fired:
             self._method_at += 1
-            self.owed = self.stopped
+            self.owed, self._fired_s = self.stopped, self._clock.now()
         self._settle(fired=told.fired)
         title = phrase("EMERGENCY STOP") if self.stopped else phrase("Fired") if told.fired else phrase("Not fired")
         self._show(title, told.text if told.fired else " ".join(filter(None, [why, told.text])), told.mood)

@@ -349,8 +349,7 @@ class FreshShortcuts(QtCore.QObject):
             return False
         key, stamp_s = key_name(event), _stamp_s(event)
         if event.type() == QtCore.QEvent.Type.KeyRelease:
-            if self._presses.is_down(key):
-                self._presses.up(key, stamp_s, repeated=event.isAutoRepeat())
+            self._presses.up(key, stamp_s, repeated=event.isAutoRepeat())
             return False
         if event.type() == QtCore.QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
             acts = self._presses.down(key, stamp_s, repeated=event.isAutoRepeat())
