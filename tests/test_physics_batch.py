@@ -82,6 +82,22 @@ def test_a_compiled_shot_has_the_digits_of_an_interpreted_one(fidelity):
             assert (ours is None and theirs is None) or ours == pytest.approx(theirs, rel=1e-13)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"back_emf_V_s_m": 1e308, "emf": "reciprocal"},
+        {"magnet_mass_kg": 5e-324},
+        {"resistance_ohm": 5e-324},
+        {"motor_constant_N_A": 1.797e308},
+    ],
+)
+def test_what_leaves_the_range_of_floats_ends_alike_compiled_or_interpreted(change):
+    pytest.importorskip("numba")
+    expected, found = simulate(GunParameters(**change)), compiled_simulator()(GunParameters(**change))
+    assert dataclasses.asdict(found) == dataclasses.asdict(expected)
+    assert expected.max_displacement_m is not None
+
+
 @pytest.mark.slow
 def test_a_compiled_shot_changes_nothing_for_the_next_interpreted_one():
     code = (

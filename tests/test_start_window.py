@@ -78,7 +78,7 @@ def opened(study: StudyFolder, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open
     What came of a shot is read at once.
     """
     windows: list[StartWindow] = []
-    monkeypatch.setattr(shot_check, "READ_S", -1.0)
+    monkeypatch.setattr(shot_check, "RESULT_S", -1.0)
 
     def open_(**how: Any) -> StartWindow:
         window = StartWindow(study, Opening(**{"gun": SERIAL} | how), RealClock())
@@ -1103,7 +1103,7 @@ def test_a_press_to_call_off_that_comes_behind_the_shot_leaves_what_came_of_it_t
     monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
     window = opened(gun="simulated")
     for read_s, page in ((1e9, 1), (-1.0, 0)):
-        monkeypatch.setattr(shot_check, "READ_S", read_s)
+        monkeypatch.setattr(shot_check, "RESULT_S", read_s)
         if not window.pages.currentIndex():
             key(window, "T", CTRL)
             until(lambda: window.shots.title.text() == "Fired" and not window.shots.is_running)

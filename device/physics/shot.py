@@ -295,11 +295,11 @@ def simulate(parameters: GunParameters, fidelity: str = "full") -> ShotSummary:
 
 def interpret(constants: Constants) -> ShotResult:
     """The result of one shot, by Python alone. Numbers beyond floats make it `not-home`."""
-    result = ShotResult()
+    state, result = ShotState(), ShotResult()
     try:
-        shoot(constants, ShotState(), StepSeries(), result)
+        shoot(constants, state, StepSeries(), result)
     except (ArithmeticError, ValueError):  # what Python raises where compiled code goes on with inf and NaN
-        return ShotResult()
+        conclude(constants, state, GIVEN_UP, result)
     return result
 
 

@@ -31,8 +31,8 @@ _SETTLED = 3
 _PROMPT_S = 0.3
 """Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
 DEAF_S = 0.4
-"""Nor while another window has the keys for so long, looked at every 0.1 s: for half a second, or it may be a little
-less. They pass from window to window in 0.3 s (assumed)."""
+"""Nor while another window has the keys for so long. Looked at every 0.1 s and told of late, it is about half a second,
+0.6 s at the most. The keys pass from window to window in 0.3 s (assumed)."""
 _LATE_S = 3.0
 """Nor does anything if that goes on for so long, and the experimenter is told (assumed)."""
 

@@ -81,7 +81,7 @@ def figure_5(panels: Sequence[ShotPanel], path_stem: Path) -> None:
 
 def _write_options(figure: Figure, options: str, width: int) -> None:
     """What a figure was made with, below it."""
-    lines = textwrap.wrap(options, width, break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(options, width, break_on_hyphens=False)
     if lines:
         figure.supxlabel("\n".join(lines), x=0.02, ha="left", fontsize=6.5, linespacing=1.4, parse_math=False)
 

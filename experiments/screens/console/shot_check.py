@@ -39,7 +39,7 @@ from experiments.session.judging import STANDSTILL_S, Beats
 COUNTDOWN_S = 3
 HUNG = phrase("The console did not hear its keys all through the countdown: nothing was fired.")
 _BEAT_MS, _LOOK_S = 100, 0.02
-READ_S = 0.5
+RESULT_S = 0.5
 """What is pressed so soon after a shot was meant for the countdown: what came of it is still to be read (assumed)."""
 SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
@@ -403,7 +403,7 @@ class ShotPage(QWidget):
     def _escape(self) -> None:
         if self.is_running:
             self.call_off()
-        elif self._clock.now() - self._fired_s > READ_S:
+        elif self._clock.now() - self._fired_s > RESULT_S:
             self.left.emit()
 
     def _take(self, told: ShotProgress) -> None:
