@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from analysis.psychometric.people import (
     GroupFit,
@@ -40,6 +39,9 @@ from experiments.design.language import (
 from experiments.design.procedures.config import PosteriorConfig
 from experiments.record.tables import AT_EDGE
 from experiments.tasks.questions import chance, correct_columns
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_FITTED, MOST_FITS = 40, 60
 """So many people, and functions, are fitted unless all are asked for: a function takes 10 to 40 ms."""
@@ -122,7 +124,7 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
     )
     if why := _unordered(design, factor, share):
         return replace(found, reason=why)
-    level = pd.to_numeric(table[factor], errors="coerce")
+    level = _coerced(table[factor])
     success = _successes(design, name, factor, share, table)
     even = int((success.isna() & table[name].notna() & level.notna()).sum()) if share == "chosen" else 0
     others = [one for one, of in design.factors.items() if len(of.all_levels) > 1]
@@ -138,6 +140,8 @@ def thresholds(design: DesignConfig, name: str, table: pd.DataFrame, *, everybod
 
 def in_design_order(design: DesignConfig, names: Sequence[str], table: pd.DataFrame) -> pd.DataFrame:
     """A table whose groups by these factors come in the order of the design's levels."""
+    import pandas as pd  # noqa: PLC0415 - who has a table has it; who plans a study needs none
+
     levels = {name: list(design.factors[name].all_levels) for name in names}
     return table.astype({name: pd.CategoricalDtype(some, ordered=True) for name, some in levels.items()})
 
@@ -229,15 +233,22 @@ def _successes(
     if share == "yes":
         return (given == YES).astype(float).where(given.notna())
     if share == "right":
-        return pd.to_numeric(table[correct_columns(design.questions)[name]], errors="coerce")
+        return _coerced(table[correct_columns(design.questions)[name]])
     if design.trial.standard_interval != "random":  # the comparison is known, also where both levels are the same
         comparison = INTERVAL_NAMES[design.trial.standard_interval == INTERVAL_NAMES[0]]
         return (given == comparison).astype(float).where(given.notna())
-    intervals = [pd.to_numeric(table[f"{factor}_{place}"], errors="coerce") for place in (1, 2)]
-    level = pd.to_numeric(table[factor], errors="coerce")
+    intervals = [_coerced(table[f"{factor}_{place}"]) for place in (1, 2)]
+    level = _coerced(table[factor])
     first, second = ((of == level) & ~(other == level) for of, other in (intervals, intervals[::-1]))
-    chosen = np.where(first, given == INTERVAL_NAMES[0], given == INTERVAL_NAMES[1]).astype(float)
-    return pd.Series(chosen, index=table.index).where(given.notna() & (first | second))
+    chosen = (given == INTERVAL_NAMES[0]).where(first, given == INTERVAL_NAMES[1])
+    return chosen.astype(float).where(given.notna() & (first | second))
+
+
+def _coerced(column: pd.Series[Any]) -> pd.Series[float]:
+    """NaN where there is no number."""
+    import pandas as pd  # noqa: PLC0415 - who has a column has it; who plans a study needs none
+
+    return pd.to_numeric(column, errors="coerce")
 
 
 def _by_condition(rows: pd.DataFrame, names: Sequence[str]) -> Iterator[tuple[dict[str, Level], pd.DataFrame]]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from experiments.design.config import DesignConfig
 from experiments.design.plan import Condition
 from experiments.design.procedures.config import KestenConfig, UpDownConfig
 from experiments.design.procedures.up_down import track_after
 from experiments.design.procedures.walks import walk_rule
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TRACK = "track"
 
