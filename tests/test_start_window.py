@@ -502,6 +502,24 @@ def test_whatever_is_held_a_test_shot_is_stopped_and_called_off(
     assert window.shots.owed is (name == "F12")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "held", "fired"),
+    [("Return", (), False), ("Q", (CTRL,), False), ("K", (), False), ("Shift", (), True), ("T", (CTRL,), True)],
+)
+def test_whatever_else_is_pressed_calls_a_test_shot_off(
+    opened: Open, monkeypatch: pytest.MonkeyPatch, name: str, held: tuple[Qt.KeyboardModifier, ...], fired: bool
+) -> None:
+    monkeypatch.setattr(shot_check, "COUNTDOWN_S", 1)
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, name, *held)
+    until(lambda: not window.shots.is_running)
+    assert window.shots.title.text() == ("Fired" if fired else "Not fired")
+    assert window.isVisible()
+
+
 # starting
 
 

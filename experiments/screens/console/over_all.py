@@ -85,6 +85,37 @@ class AnyHeld(_OverAll):
         return True
 
 
+class WhateverPressed(_OverAll):
+    """Has any press of a key act, but for those of one key and of what is held beside others; it goes on to its place.
+
+    Of what is a shortcut Qt tells no press, but that it is about to look for it.
+    """
+
+    def __init__(self, window: QWidget, but: str, act: Callable[[], object]) -> None:
+        super().__init__(window)
+        self._but, self._act = but, act
+
+    def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
+        """Look at it, and take nothing."""
+        del watched
+        if isinstance(event, QKeyEvent) and self._is_meant(event):
+            self._act()
+        return False
+
+    def _is_meant(self, event: QKeyEvent) -> bool:
+        went_down = event.type() != QtCore.QEvent.Type.KeyRelease and not event.isAutoRepeat()
+        return went_down and event.key() not in _BESIDE and key_name(event) != self._but
+
+
+_BESIDE = {
+    QtCore.Qt.Key.Key_Shift,
+    QtCore.Qt.Key.Key_Control,
+    QtCore.Qt.Key.Key_Alt,
+    QtCore.Qt.Key.Key_AltGr,
+    QtCore.Qt.Key.Key_Meta,
+}
+
+
 class KeepsKeys(_OverAll):
     """Keeps menus shut, and text from being dragged, while a page is shown: both take every key for themselves.
 

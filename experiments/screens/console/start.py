@@ -19,7 +19,7 @@ from experiments.record.journal import JournalError
 from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets, windows
 from experiments.screens.console.form import Form, Opening, PeopleTable
-from experiments.screens.console.over_all import AnyHeld
+from experiments.screens.console.over_all import AnyHeld, WhateverPressed
 from experiments.screens.console.shot_check import ShotPage
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.phrases import phrase
@@ -116,6 +116,7 @@ class StartWindow(QtWidgets.QWidget):
         self.shots.over = self._shot_over
         AnyHeld(self, "F12", self._emergency_stop)
         AnyHeld(self, "Esc", self.shots.call_off, when=lambda: self.shots.is_running)
+        WhateverPressed(self, "T", self.shots.call_off)
 
     # showing
 
