@@ -247,6 +247,28 @@ def test_a_test_shot_whose_key_was_let_go_while_the_console_stood_still_is_not_f
     assert 1.0 <= shot["held_s"] < 1.5
 
 
+def test_whatever_is_pressed_while_the_key_of_the_test_shot_is_held_calls_it_off(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.REARMING)
+    with cell.reach() as screen:
+        fired = len(cell.watch.calls("fired"))
+        for other in ("x", "Tab", "F5", "Delete", "Shift_L", "mouse", "close"):
+            screen.keys.key_down("t")
+            screen.until(lambda look: look.says("Hold it"))
+            if other == "mouse":
+                with screen.button_down("help", mouse=3):
+                    pass
+            elif other == "close":
+                screen.keys.press("F4", "Alt_L")  # by the window manager
+            else:
+                screen.keys.press(other)
+            screen.until(lambda look: look.says("Let go too soon: hold it for 1 s.") or look.line)
+            time.sleep(1.3)
+            screen.keys.key_up("t")
+            assert screen.look().state == "rearming"
+            assert len(cell.watch.calls("fired")) == fired, other
+            time.sleep(0.3)
+
+
 @needs_psychopy
 def test_on_the_participants_window_f12_halts_a_train_and_other_keys_do_nothing(tmp_path: Path, display: str) -> None:
     cell = Cell(tmp_path, display, S.TRAIN, "--participant-screen")

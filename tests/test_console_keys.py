@@ -27,6 +27,7 @@ from experiments.screens.console.keys import (
     why_not,
 )
 from experiments.session import events
+from experiments.session.events import Press
 from experiments.session.states import TABLE, No, Position, State
 from experiments.session.steps import Asking, what
 from experiments.tasks.questions import choices
@@ -321,10 +322,16 @@ def test_a_stamp_whose_zero_has_jumped_is_not_believed(jump_s: int) -> None:
 
 
 def test_a_key_that_nobody_looked_at_for_a_while_is_held_anew() -> None:
-    hold = Hold(10.0)
-    assert [hold.held_s(at_s) for at_s in (10.1, 10.25, 10.5)] == pytest.approx([0.1, 0.25, 0.5])
-    assert hold.held_s(13.5) == 0.0  # stopped, starved or swapped out: it may have been let go
-    assert hold.held_s(13.6) == pytest.approx(0.1)
+    hold = Hold(Press(at_s=10.0, serial=1), 10.0, by_key=True)
+    assert [hold.held_s(at_s, down=True) for at_s in (10.1, 10.25, 10.5)] == pytest.approx([0.1, 0.25, 0.5])
+    assert hold.held_s(13.5, down=True) == 0.0  # stopped, starved or swapped out: it may have been let go
+    assert hold.held_s(13.6, down=True) == pytest.approx(0.1)
+
+
+def test_a_key_that_may_have_been_let_go_counts_as_held_only_once_it_is_down_again() -> None:
+    by_key, by_mouse = (Hold(Press(at_s=10.0, serial=1), 10.0, by_key=by_key) for by_key in (True, False))
+    assert [hold.held_s(10.2, down=False) for hold in (by_key, by_mouse)] == pytest.approx([0.0, 0.2])
+    assert by_key.held_s(10.3, down=True) == pytest.approx(0.3)
 
 
 def test_a_key_that_is_held_is_not_let_go_by_repeats_that_come_as_releases_and_presses_apart() -> None:

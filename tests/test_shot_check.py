@@ -198,6 +198,16 @@ def test_the_gun_is_armed_for_the_shot_alone_and_its_state_is_read_back_before_i
     assert over.text.endswith("The gun reports: disarmed.")
 
 
+def test_keys_that_are_elsewhere_as_a_beat_comes_late_went_when_it_was_due() -> None:
+    now_s = [0.0]
+    beats = Beats(lambda: now_s[0])
+    for now_s[0], heard in ((0.0, True), (0.1, True), (0.35, False), (0.45, False), (0.55, False)):
+        beats.beat(heard=heard)
+    assert not beats.is_deaf
+    now_s[0] = 0.61
+    assert beats.is_deaf
+
+
 def test_a_countdown_says_each_second_and_then_fires(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(monkeypatch, countdown_s=1)
     assert bench.carry_out().fired

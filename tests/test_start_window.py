@@ -505,7 +505,7 @@ def test_whatever_is_held_a_test_shot_is_stopped_and_called_off(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "held", "fired"),
-    [("Return", (), False), ("Q", (CTRL,), False), ("K", (), False), ("Shift", (), True), ("T", (CTRL,), True)],
+    [("Return", (), False), ("Q", (CTRL,), False), ("K", (), False), ("Shift", (), False), ("T", (), True)],
 )
 def test_whatever_else_is_pressed_calls_a_test_shot_off(
     opened: Open, monkeypatch: pytest.MonkeyPatch, name: str, held: tuple[Qt.KeyboardModifier, ...], fired: bool
@@ -518,6 +518,33 @@ def test_whatever_else_is_pressed_calls_a_test_shot_off(
     until(lambda: not window.shots.is_running)
     assert window.shots.title.text() == ("Fired" if fired else "Not fired")
     assert window.isVisible()
+
+
+def test_a_click_stops_again_whose_button_was_down_as_its_window_was_minimised(opened: Open) -> None:
+    window = opened(gun="simulated")
+    for names in ("T", "TS"):  # after an emergency stop it is asked for
+        for one in names:
+            key(window, one, CTRL)
+        until(lambda: window.shots.count.text() != "")
+        QTest.mousePress(window.shots.stop_button, Qt.MouseButton.LeftButton)
+        assert window.shots.stopped
+        until(lambda: not window.shots.is_running)
+        window.showMinimized()
+        window.showNormal()
+        window.activateWindow()
+        assert QTest.qWaitForWindowActive(window)
+        key(window, "Escape")
+
+
+@pytest.mark.slow
+def test_what_came_of_a_shot_is_read_before_the_key_of_the_next(opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shot_check, "COUNTDOWN_S", 0)
+    monkeypatch.setattr(shot_check, "RESULT_S", 1e9)
+    window = opened(gun="simulated")
+    for _ in range(2):
+        key(window, "T", CTRL)
+        until(lambda: window.shots.title.text() == "Fired" and not window.shots.is_running)
+    assert window.shots.detail.toPlainText().startswith("Vibration")
 
 
 # starting

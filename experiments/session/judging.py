@@ -28,8 +28,10 @@ STANDSTILL_S = 1.0
 """A screen that did not look at its keys for so long stood still: as long as a gun that was away may still be armed."""
 _SETTLED = 3
 """So many beats in time after that, and what was pressed meanwhile has come."""
+BEAT_S = 0.1
+"""How often a screen looks at its keys."""
 _PROMPT_S = 0.3
-"""Beats further apart than that, of 0.1 s each, and a stop may wait to be heard: nothing fires before it (assumed)."""
+"""Beats further apart than that and a stop may wait to be heard: nothing fires before it (assumed)."""
 DEAF_S = 0.4
 """Nor while another window has the keys for so long. Looked at every 0.1 s and told of late, it is about half a second,
 0.6 s at the most. The keys pass from window to window in 0.3 s (assumed)."""
@@ -56,7 +58,7 @@ class Beats:
         """
         now_s = self._now()
         self._note_deaf(self._last_s if heard else now_s)
-        self._deaf_s = math.inf if heard else min(self._deaf_s, now_s)
+        self._deaf_s = math.inf if heard else min(self._deaf_s, now_s, self._last_s + BEAT_S)
         self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
         self._last_s = now_s
         self._lately = (*self._lately[-_SETTLED:], now_s)

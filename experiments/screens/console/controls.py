@@ -87,7 +87,7 @@ class Controls:
         self._choices, self._hand, self._participant = choices, hand, participant
         self._synthetic, self._kept = synthetic, kept
         self._open: tuple[keys.Name, Trial] | None = None
-        self._held: tuple[Press, keys.Hold] | None = None
+        self._held: keys.Hold | None = None
         self.drawn = live.position
         self.page: keys.Name | None = None
         self.ended = False
@@ -134,7 +134,7 @@ class Controls:
         self._live.beats.hear()
         press = self.press(at_s)
         if name == "rearm":
-            self.hold(press)
+            self.hold(press, by_key=True)
         else:
             self.do(name, press)
 
@@ -143,12 +143,12 @@ class Controls:
         if key == keys.BY_NAME["rearm"].key:
             self.let_go()
 
-    def hold(self, press: Press) -> None:
+    def hold(self, press: Press, *, by_key: bool = False) -> None:
         """The key or button of the test shot went down: it has to be held."""
         if self.page:
             self._run_again()
         elif self.drawn.state is State.REARMING and self._held is None:
-            self._held = press, keys.Hold(self._clock.now())
+            self._held = keys.Hold(press, self._clock.now(), by_key=by_key)
             self._view.say(phrase("Hold it …"), "wait")
 
     def let_go(self) -> None:
@@ -157,13 +157,13 @@ class Controls:
             self._held = None
             self._view.say(phrase("Let go too soon: hold it for {held_s:g} s.", held_s=REARM_HELD_S), "wait")
 
-    def tick(self, *, here: bool = True) -> None:
-        """Look whether it was held for long enough, and whether a line or a page takes what is typed `here`."""
+    def tick(self, *, here: bool = True, down: bool = True) -> None:
+        """Look whether it was held for long enough, its key still `down`, and what takes what is typed `here`."""
         if self._participant is not None:
             self._participant.covered = here and self.covered
-        press, hold = self._held or (None, None)
-        if hold is not None and (held_s := hold.held_s(self._clock.now())) >= REARM_HELD_S:
-            self._held = None
+        held_s = 0.0 if self._held is None else self._held.held_s(self._clock.now(), down=down)
+        if self._held is not None and held_s >= REARM_HELD_S:
+            press, self._held = self._held.press, None
             self._offer(events.Rearm(held_s=held_s), press)
 
     def clicked(self, name: keys.Name, press: Press, *, heard: bool) -> None:
@@ -360,6 +360,7 @@ class Controls:
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to end a live run, or close its window: a gun that may fire is disarmed first."""
+        self.let_go()
         if self._live.position.base in ARMED:
             self._offer(events.Pause())
         self.uncover()

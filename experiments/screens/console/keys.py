@@ -14,7 +14,7 @@ from experiments.design.config import DesignConfig
 from experiments.design.language import QuestionConfig
 from experiments.screens.phrases import phrase
 from experiments.session import events
-from experiments.session.events import Event
+from experiments.session.events import Event, Press
 from experiments.session.states import ARMED, No, Position, State, change_of
 from experiments.session.steps import Ask, Describe, Rate
 from experiments.tasks.questions import CONFIRMS, Choice, choices
@@ -336,17 +336,18 @@ LOOKED_S = 0.3
 
 
 class Hold:
-    """For how long a key is held: after a while in which nobody looked it begins anew."""
+    """A press that is held, of a key or of the mouse: after a while in which nobody looked it begins anew."""
 
-    def __init__(self, now_s: float) -> None:
+    def __init__(self, press: Press, now_s: float, *, by_key: bool) -> None:
+        self.press, self._by_key = press, by_key
         self._from_s = self._seen_s = now_s
 
-    def held_s(self, now_s: float) -> float:
-        """For how long, as somebody looks now."""
+    def held_s(self, now_s: float, *, down: bool) -> float:
+        """For how long, as somebody looks now; 0 while its key is not `down`: whether it was let go is known later."""
         if now_s - self._seen_s > LOOKED_S:
             self._from_s = now_s
         self._seen_s = now_s
-        return now_s - self._from_s
+        return now_s - self._from_s if down or not self._by_key else 0.0
 
 
 class Presses:
@@ -374,6 +375,10 @@ class Presses:
             self._up_s[key] = at_s
             self._ups[key] = self._ups.get(key, 0) + 1
         return self._ups.get(key, 0)
+
+    def is_down(self, key: str) -> bool:
+        """Whether a key is down, for all that was told until now."""
+        return key in self._down
 
     def was_let_go(self, key: str, number: int) -> bool:
         """Whether a hand let a key go by a release a while ago: it was the last one, and the key is not down again.

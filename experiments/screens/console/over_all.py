@@ -86,34 +86,26 @@ class AnyHeld(_OverAll):
 
 
 class WhateverPressed(_OverAll):
-    """Has any press of a key act, but for those of one key and of what is held beside others; it goes on to its place.
+    """Has any press act, of all keys but one, and of the mouse as well if so asked; each goes on to its place.
 
     Of what is a shortcut Qt tells no press, but that it is about to look for it.
     """
 
-    def __init__(self, window: QWidget, but: str, act: Callable[[], object]) -> None:
+    def __init__(self, window: QWidget, act: Callable[[], object], *, but: str, mouse: bool = False) -> None:
         super().__init__(window)
-        self._but, self._act = but, act
+        self._act, self._but, self._mouse = act, but, mouse
 
     def takes(self, watched: QtCore.QObject | None, event: QtCore.QEvent) -> bool:
         """Look at it, and take nothing."""
         del watched
-        if isinstance(event, QKeyEvent) and self._is_meant(event):
+        if isinstance(event, QKeyEvent):
+            went_down = event.type() != QtCore.QEvent.Type.KeyRelease and not event.isAutoRepeat()
+            acts = went_down and key_name(event) != self._but
+        else:
+            acts = self._mouse and event.type() == QtCore.QEvent.Type.MouseButtonPress
+        if acts:
             self._act()
         return False
-
-    def _is_meant(self, event: QKeyEvent) -> bool:
-        went_down = event.type() != QtCore.QEvent.Type.KeyRelease and not event.isAutoRepeat()
-        return went_down and event.key() not in _BESIDE and key_name(event) != self._but
-
-
-_BESIDE = {
-    QtCore.Qt.Key.Key_Shift,
-    QtCore.Qt.Key.Key_Control,
-    QtCore.Qt.Key.Key_Alt,
-    QtCore.Qt.Key.Key_AltGr,
-    QtCore.Qt.Key.Key_Meta,
-}
 
 
 class KeepsKeys(_OverAll):
@@ -139,8 +131,7 @@ class KeepsKeys(_OverAll):
         under = QApplication.widgetAt(event.globalPosition().toPoint())
         if not isinstance(under, ConsoleButton) or not under.stops or under.window() is not self._window.window():
             return False
-        if not under.isDown():
-            under.went_down.emit()
+        under.went_down.emit()
         return True
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +20,7 @@ from PyQt6.QtWidgets import QVBoxLayout, QWidget
 
 from device import DeviceError, Gun, GunStatus, Shot, ShotReport, open_gun
 from device.methods import drive_of
-from device.words import Drive, Effect
+from device.words import Drive
 from experiments.clock import Clock
 from experiments.config.setup import Setup
 from experiments.design.config import DesignConfig
@@ -31,17 +31,17 @@ from experiments.record.tables import is_simulated
 from experiments.screens.console import widgets
 from experiments.screens.console.instructions import DISARMING
 from experiments.screens.console.over_all import KeepsKeys
+from experiments.screens.console.shot_words import report_text, state_text
 from experiments.screens.console.widgets import TextLines
 from experiments.screens.console.windows import has_keys
 from experiments.screens.phrases import phrase
-from experiments.session.judging import STANDSTILL_S, Beats
+from experiments.session.judging import BEAT_S, STANDSTILL_S, Beats
 
 COUNTDOWN_S = 3
 HUNG = phrase("The console did not hear its keys all through the countdown: nothing was fired.")
-_BEAT_MS, _LOOK_S = 100, 0.02
+_LOOK_S = 0.02
 RESULT_S = 0.5
 """What is pressed so soon after a shot was meant for the countdown: what came of it is still to be read (assumed)."""
-SWITCH_OFF = phrase("SWITCH OFF ITS POWER.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,59 +172,6 @@ class ShotCheck:
             return None
 
 
-def report_text(label: str, report: ShotReport, drive: Drive) -> str:
-    """What the gun reported of a shot, in words."""
-    return f"{label}: {' '.join(_report_sentences(report, drive))}"
-
-
-def _report_sentences(report: ShotReport, drive: Drive) -> Iterator[str]:
-    duration_ms = 1000 * (report.pulse_end_s - report.pulse_start_s)
-    if isinstance(drive, Effect):
-        yield phrase("the gun vibrated for {duration_ms:.0f} ms.", duration_ms=duration_ms)
-    else:
-        yield phrase(
-            "the coil was driven at {voltage_V:g} V for {duration_ms:.1f} ms.",
-            voltage_V=drive.voltage_V,
-            duration_ms=duration_ms,
-        )
-        yield _motion(report)
-    if report.timing is not None:
-        began_ms = 1000 * (report.pulse_start_s - report.timing.requested_s)
-        yield (
-            phrase(
-                (
-                    "The pulse began {began_ms:.1f} ms after the request, by the gun's clock (to within "
-                    "{uncertainty_s:.1f} ms)."
-                ),
-                began_ms=began_ms,
-                uncertainty_s=1000 * report.timing.uncertainty_s,
-            )
-        )
-
-
-def _motion(report: ShotReport) -> str:
-    """What the magnet did by the model: there is no sensor that sees it."""
-    if report.motion == "no-break-away":
-        return phrase("By the model the magnet did not move.")
-    if report.motion == "home":
-        home_ms = 1000 * (report.home_predicted_s - report.pulse_start_s)
-        return phrase("By the model the magnet moved, and was home after {home_ms:.0f} ms.", home_ms=home_ms)
-    return phrase("By the model the magnet is not home ({motion}).", motion=report.motion)
-
-
-def state_text(status: GunStatus | None) -> tuple[str, bool]:
-    """What the gun reports of itself, and whether it is safe to take."""
-    if status is None:
-        return phrase("The gun's state cannot be read: {switch_off}", switch_off=SWITCH_OFF), False
-    if status.fault is not None:
-        return phrase(
-            "The gun reports a fault ({fault}): {switch_off}", fault=status.fault, switch_off=SWITCH_OFF
-        ), False
-    if status.state != "disarmed":
-        return phrase("The gun reports: {state}. {switch_off}", state=status.state, switch_off=SWITCH_OFF), False
-    return phrase("The gun reports: disarmed."), True
-
-
 class ShotPage(QWidget):
     """Takes the window's place from the press of a button until somebody goes back. One test shot at a time."""
 
@@ -251,7 +198,7 @@ class ShotPage(QWidget):
         self.told.connect(self._take)
         self._beat = QTimer(self)
         self._beat.timeout.connect(self._beats)
-        self._beat.start(_BEAT_MS)
+        self._beat.start(round(1000 * BEAT_S))
         self.unkept.connect(self._say_unkept)
         self._build()
 
@@ -315,7 +262,7 @@ class ShotPage(QWidget):
 
     def begin(self) -> None:
         """Test the next method."""
-        if self._check is not None or self._setup is None or self.stopped:
+        if self._check is not None or self._setup is None or self.stopped or self._is_to_be_read:
             return
         method = self._next_method(self._setup)
         self._shown = self.next_text().removeprefix(phrase("Test shot: "))
@@ -403,8 +350,12 @@ class ShotPage(QWidget):
     def _escape(self) -> None:
         if self.is_running:
             self.call_off()
-        elif self._clock.now() - self._fired_s > RESULT_S:
+        elif not self._is_to_be_read:
             self.left.emit()
+
+    @property
+    def _is_to_be_read(self) -> bool:
+        return self._clock.now() - self._fired_s < RESULT_S
 
     def _take(self, told: ShotProgress) -> None:
         """Show how far the test shot is."""

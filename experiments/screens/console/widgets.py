@@ -111,13 +111,16 @@ class ConsoleButton(QtWidgets.QPushButton):
 
     def mousePressEvent(self, event: QtGui.QMouseEvent | None) -> None:  # noqa: N802 - Qt's name
         """Go down by the mouse."""
-        was_down = self.isDown()
-        if event is not None:
-            self._pressed_ms = event.timestamp()
-        if event is not None and self.stops and event.button() != Qt.MouseButton.LeftButton:
+        if event is None:
+            return
+        self._pressed_ms = event.timestamp()
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.setDown(False)  # nobody hears that it is let go while its window is minimised
+        elif self.stops:
             event.accept()
             self.went_down.emit()
             return
+        was_down = self.isDown()
         super().mousePressEvent(event)
         if self.isDown() and not was_down:  # another button of the mouse may be pressed beside
             self.went_down.emit()

@@ -19,7 +19,7 @@ from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.instructions import instruction
 from experiments.screens.console.keys import BY_NAME, Name, Typing, own_arrows
-from experiments.screens.console.over_all import KeepsKeys
+from experiments.screens.console.over_all import KeepsKeys, WhateverPressed
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import are_keys_heard, marks
 from experiments.screens.console.windows import Keyboard, has_keys, remember, scaled_sheet
@@ -29,12 +29,12 @@ from experiments.screens.texts import saved_text
 from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
+from experiments.session.judging import BEAT_S
 from experiments.session.remarks import Halted, Noted
 from experiments.session.states import Position, State
 from experiments.session.steps import Failed, Prepared, Rested, trial_of
 from experiments.session.tracks import Tracks, adaptive_tracks
 
-REFRESH_MS = 100
 SOON_MS = 3
 """How soon news is drawn: an answer's record is on the disk by then, and what it leads to is drawn with it."""
 BRIEF_S = 4.0
@@ -84,15 +84,14 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._build()
         self._keyboard = Keyboard(self, clock.now)
         KeepsKeys(self)
+        WhateverPressed(self, self.let_go, but=BY_NAME["rearm"].key, mouse=True)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._beat)
-        self._timer.start(REFRESH_MS)
+        self._timer.start(round(1000 * BEAT_S))
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
         self._soon.setInterval(SOON_MS)
         self._soon.timeout.connect(self.refresh)
-
-    # building
 
     def _build(self) -> None:
         what = self.about.band or self.about.plan.experiment
@@ -291,7 +290,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         """
         self._soon.stop()
         if self.controls is not None:
-            self.controls.tick(here=self.isActiveWindow())
+            self.controls.tick(here=self.isActiveWindow(), down=self._keyboard.is_down(BY_NAME["rearm"].key))
         seen = self.seen
         if self.live is not None:
             self.live.gun_silence = seen.gun_silence

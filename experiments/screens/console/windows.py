@@ -301,6 +301,10 @@ class Keyboard(QtCore.QObject):
             return False
         return self._pressed(key, event)
 
+    def is_down(self, key: str) -> bool:
+        """Whether a key is down, and not perhaps let go."""
+        return self._presses.is_down(key)
+
     def _let_go(self, key: str, number: int) -> None:
         """Say that a key was let go by a release, if it was."""
         if self._presses.was_let_go(key, number):
