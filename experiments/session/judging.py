@@ -32,9 +32,9 @@ BEAT_S = 0.1
 """How often a screen looks at its keys."""
 _PROMPT_S = 0.3
 """Beats further apart than that and a stop may wait to be heard: nothing fires before it (assumed)."""
-DEAF_S = 0.4
-"""Nor while another window has the keys for so long. Looked at every 0.1 s and told of late, it is about half a second,
-0.6 s at the most. The keys pass from window to window in 0.3 s (assumed)."""
+DEAF_S = 0.5
+"""Nor while another window has the keys for so long, from the beat before the last that heard them on: 0.6 s at the
+most. The keys pass from window to window in 0.3 s (assumed)."""
 _LATE_S = 3.0
 """Nor does anything if that goes on for so long, and the experimenter is told (assumed)."""
 
@@ -49,7 +49,7 @@ class Beats:
         self._now, self._last_s, self._alive_s, self._in_time = now, math.inf, -math.inf, _SETTLED
         self._lately: tuple[float, ...] = ()
         self._late_s = self._deaf_s = math.inf
-        self._was_deaf_s = -math.inf
+        self._was_deaf_s, self._heard_s = -math.inf, math.inf
 
     def beat(self, *, heard: bool = True) -> None:
         """The timer beats; `heard`: what is pressed comes here.
@@ -58,7 +58,10 @@ class Beats:
         """
         now_s = self._now()
         self._note_deaf(self._last_s if heard else now_s)
-        self._deaf_s = math.inf if heard else min(self._deaf_s, now_s, self._last_s + BEAT_S)
+        if heard:  # what the window system tells late, a beat may not know yet
+            self._deaf_s, self._heard_s = math.inf, min(self._last_s, now_s)
+        else:
+            self._deaf_s = min(self._deaf_s, self._heard_s + BEAT_S, now_s)
         self._in_time = 0 if now_s - self._last_s > STANDSTILL_S else self._in_time + 1
         self._last_s = now_s
         self._lately = (*self._lately[-_SETTLED:], now_s)
@@ -69,7 +72,7 @@ class Beats:
     def hear(self) -> None:
         """A key came here, or would have: so what is pressed is heard."""
         self._note_deaf(self._last_s)
-        self._deaf_s = math.inf
+        self._deaf_s, self._heard_s = math.inf, self._now()
 
     def _note_deaf(self, last_s: float) -> None:
         """If what is pressed has gone elsewhere for a while, it did so until then at the least."""
