@@ -151,11 +151,11 @@ class Controls:
             self._held = keys.Hold(press, self._clock.now(), by_key=by_key)
             self._view.say(phrase("Hold it …"), "wait")
 
-    def let_go(self) -> None:
-        """It was let go."""
+    def let_go(self, *, by_hand: bool = True) -> None:
+        """It was let go, or something else was pressed."""
         if self._held is not None:
             self._held = None
-            self._view.say(phrase("Let go too soon: hold it for {held_s:g} s.", held_s=REARM_HELD_S), "wait")
+            self._view.say(keys.not_held_text(REARM_HELD_S, by_hand=by_hand), "wait")
 
     def tick(self, *, here: bool = True, down: bool = True) -> None:
         """Look whether it was held for long enough, its key still `down`, and what takes what is typed `here`."""
@@ -174,7 +174,7 @@ class Controls:
 
     def do(self, name: keys.Name, press: Press) -> None:
         """Carry out a command; a test shot that is held for meanwhile is not what was meant."""
-        self.let_go()
+        self.let_go(by_hand=False)
         match name:
             case "emergency":
                 self._offer(events.EmergencyStop())
@@ -360,7 +360,7 @@ class Controls:
 
     def ask_why_it_stops(self) -> None:
         """Somebody wants to end a live run, or close its window: a gun that may fire is disarmed first."""
-        self.let_go()
+        self.let_go(by_hand=False)
         if self._live.position.base in ARMED:
             self._offer(events.Pause())
         self.uncover()

@@ -350,6 +350,13 @@ class Hold:
         return now_s - self._from_s if down or not self._by_key else 0.0
 
 
+def not_held_text(held_s: float, *, by_hand: bool) -> str:
+    """Why a press did not last: it was let go, or something else was pressed."""
+    if by_hand:
+        return phrase("Let go too soon: hold it for {held_s:g} s.", held_s=held_s)
+    return phrase("Something else was pressed meanwhile: hold it alone for {held_s:g} s.", held_s=held_s)
+
+
 class Presses:
     """Which keys are down, so that a press acts once.
 

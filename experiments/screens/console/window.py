@@ -6,6 +6,7 @@ It decides nothing: keys and buttons become events, and the table of states judg
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from PyQt6 import QtWidgets
 from PyQt6.QtCore import QCoreApplication, QEvent, QTimer, pyqtSignal
@@ -84,7 +85,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self._build()
         self._keyboard = Keyboard(self, clock.now)
         KeepsKeys(self)
-        WhateverPressed(self, self.let_go, but=BY_NAME["rearm"].key, mouse=True)
+        WhateverPressed(self, partial(self.let_go, by_hand=False), but=BY_NAME["rearm"].key, mouse=True)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._beat)
         self._timer.start(round(1000 * BEAT_S))
@@ -397,10 +398,10 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if self.controls is not None:
             self.controls.hold(press)
 
-    def let_go(self) -> None:
-        """It was let go."""
+    def let_go(self, *, by_hand: bool = True) -> None:
+        """It was let go, or something else was pressed."""
         if self.controls is not None:
-            self.controls.let_go()
+            self.controls.let_go(by_hand=by_hand)
 
     # what the controls need
 
