@@ -328,6 +328,49 @@ def test_what_is_typed_while_the_program_stands_still_fires_nothing(quick_config
     assert len(bodies(tmp_path, "fired")) == 1
 
 
+HELD, GOES_ON = "\x13", "\x11"
+"""Ctrl+S and Ctrl+Q: the terminal shows nothing in between."""
+
+
+def test_what_is_typed_while_the_terminal_shows_nothing_fires_nothing(quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.wait_for(DAMPER)
+        screen.type("d")
+        screen.wait_for(FIRES)
+        screen.type(f"{HELD}x")  # who reads it waits to answer
+        screen.type("")
+        time.sleep(1.5)  # this is how long it is held
+        screen.type(GOES_ON)
+        screen.wait_for("The console stood still as that was pressed: look where the gun is, and press again.", 2)
+        assert bodies(tmp_path, "fired") == []
+        screen.type("stop")
+        assert screen.end() == 130
+
+
+def train_shots(folder: Path) -> int:
+    path = folder / "results/sub-P01/sub-P01_task-preference_journal.jsonl"
+    return sum(json.loads(line)["kind"] == "shot" for line in path.read_text(encoding="utf-8").splitlines())
+
+
+def test_a_train_fires_no_shot_while_the_terminal_cannot_show_what_was_typed(
+    quick_configs: Path, tmp_path: Path
+) -> None:
+    with AtTerminal(run(quick_configs, "preference", "--seed", 1), tmp_path) as screen:
+        screen.fire()
+        screen.wait_for("Enter when the participant says next:")
+        screen.type(f"{HELD}x")
+        time.sleep(1.0)  # a shot that was on its way is over
+        before = train_shots(tmp_path)
+        time.sleep(2.0)
+        screen.type("!")
+        assert train_shots(tmp_path) == before
+        screen.type(GOES_ON)
+        screen.wait_for("EMERGENCY STOP.")
+        screen.type("")
+        assert screen.end() == 130
+    assert train_shots(tmp_path) == before
+
+
 def test_an_answer_that_is_typed_while_the_last_one_is_being_saved_is_on_record_as_what_it_was(tmp_path: Path) -> None:
     setup = changed("direction", console={"guard_s": 0.0})
     request = RunRequest(setup=setup, participant_id="P01", results=tmp_path / "results", seed=1, again="ask")
@@ -392,7 +435,10 @@ def test_undo_flag_note_pause_and_repeat_by_typed_words(quick_configs: Path, tmp
     assert [one["kind"] for one in journal_of(tmp_path) if one["kind"] == "stopped"] == ["stopped"]
 
 
-@pytest.mark.parametrize("typed", ["fo!", "stop!", "\x1b[24~", "note it\x1b[24~", "\x1b[24;5~", "stop\x1b[24;2~"])
+@pytest.mark.parametrize(
+    "typed",
+    ["fo!", "stop!", "\uff01", "fo\uff01", "\x1b[24~", "note it\x1b[24~", "\x1b[24;5~", "stop\x1b[24;2~", "\x1b[24^"],
+)
 def test_what_was_half_typed_does_not_swallow_an_emergency_stop(
     typed: str, quick_configs: Path, tmp_path: Path
 ) -> None:

@@ -7,6 +7,7 @@ experimenter's hand and are logged as such. Neither correctness nor a score is e
 from __future__ import annotations
 
 import io
+import math
 import os
 import re
 import sys
@@ -46,8 +47,13 @@ _HALTED = (
 )
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
 _TICK_S, _BEAT_S = 1.0, 0.1
-_F12 = re.compile(r"\[24(;\d+)?~")
-"""What is left on a line of the console's key for an emergency stop; behind a semicolon stands what is held beside."""
+_F12 = re.compile(r"\[24(;\d+)?[~^$@]")
+"""What is left on a line of the console's key for an emergency stop. What is held beside stands behind a semicolon,
+or is its last sign."""
+_STOPS = ("!", "\uff01")
+"""Input methods of Chinese and Japanese write the second, the wide one."""
+_HELD_S = 0.3
+"""Who writes for longer waits for the terminal, which Ctrl+S holds: nobody sees, or is heard (assumed)."""
 
 
 class TerminalScreen:
@@ -71,7 +77,7 @@ class TerminalScreen:
         self._lock = threading.RLock()
         self._live: LiveRun | None = None
         self._shown, self._serial = Position(), -1
-        self._gone = False
+        self._gone, self._writing_s = False, math.inf
         self._doubted = "", -1
 
     def begin(self, live: LiveRun) -> None:
@@ -195,6 +201,9 @@ class TerminalScreen:
         self._closed()
 
     def _typed(self, line: str) -> None:
+        if _is_plain_stop(line):  # whoever shows may hold the lock
+            self._offer(events.EmergencyStop())
+            return
         with self._lock:
             position = self._shown
         now_s = self._clock.now()
@@ -215,8 +224,6 @@ class TerminalScreen:
 
     def _meant(self, line: str, position: Position, now_s: float) -> Event | str | None:
         """The event that a line means there, or what to say about it."""
-        if line.startswith("!") or _F12.search(line):
-            return events.EmergencyStop()
         word, _, rest = line.removeprefix("/").partition(" ")
         word = word.lower()
         words = position.state in (State.DESCRIBING, State.HALTED) or _corrects_words(position)
@@ -226,7 +233,7 @@ class TerminalScreen:
         if words and line.lower() in _COMMANDS and self._doubted != (line, position.serial):
             self._doubted = line, position.serial
             return f"As a command that is `/{word}`. If it is what was said, type `{line}` again."
-        if "!" in line and not free:  # behind what was half typed
+        if any(one in line for one in _STOPS) and not free:  # behind what was half typed
             return events.EmergencyStop()
         return _line(line, position, now_s)
 
@@ -243,9 +250,13 @@ class TerminalScreen:
                     self._show(_counted(max(0.0, position.until_s - self._clock.now())))
 
     def _beat(self) -> None:
-        """Beat: where the program stands still nothing does, and what was typed meanwhile is known by that."""
+        """Beat: where the program stands still nothing does, and what was typed meanwhile is known by that.
+
+        So it does where nothing can be shown: who reads what is typed may be waiting to answer.
+        """
         while self._live is not None and self._shown.state is not State.STOPPED:
-            self._live.beats.beat()
+            if self._clock.now() - self._writing_s < _HELD_S:
+                self._live.beats.beat()
             time.sleep(_BEAT_S)
 
     def _say(self, text: str) -> None:
@@ -260,8 +271,10 @@ class TerminalScreen:
     def _show(self, text: str) -> None:
         try:
             with self._lock:
+                self._writing_s = self._clock.now()
                 self._out.write(text)
                 self._out.flush()
+                self._writing_s = math.inf
         except (OSError, ValueError):
             self._closed()
 
@@ -271,6 +284,10 @@ class TerminalScreen:
             self._gone = True
             stop = events.Stop(reason="the terminal was closed")
             threading.Thread(target=live.offer, args=(stop,), daemon=True).start()
+
+
+def _is_plain_stop(line: str) -> bool:
+    return line.startswith(_STOPS) or bool(_F12.search(line))
 
 
 _COUNTED = len("  1800 s ")

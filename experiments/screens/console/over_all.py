@@ -100,7 +100,8 @@ class WhateverPressed(_OverAll):
         del watched
         if isinstance(event, QKeyEvent):
             went_down = event.type() != QtCore.QEvent.Type.KeyRelease and not event.isAutoRepeat()
-            acts = went_down and key_name(event) != self._but
+            beside = "Ctrl+" if event.modifiers() & QtCore.Qt.KeyboardModifier.ControlModifier else ""
+            acts = went_down and f"{beside}{key_name(event)}" != self._but
         else:
             acts = self._mouse and event.type() == QtCore.QEvent.Type.MouseButtonPress
         if acts:

@@ -116,7 +116,7 @@ class StartWindow(QtWidgets.QWidget):
         self.shots.over = self._shot_over
         AnyHeld(self, "F12", self._emergency_stop)
         AnyHeld(self, "Esc", self.shots.call_off, when=lambda: self.shots.is_running)
-        WhateverPressed(self, self.shots.call_off, but="T")
+        WhateverPressed(self, self.shots.call_off, but="Ctrl+T")
 
     # showing
 
