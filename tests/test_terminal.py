@@ -347,9 +347,14 @@ def test_what_is_typed_while_the_terminal_shows_nothing_fires_nothing(quick_conf
         assert screen.end() == 130
 
 
-def train_shots(folder: Path) -> int:
+def preference_journal(folder: Path) -> list[dict[str, Any]]:
     path = folder / "results/sub-P01/sub-P01_task-preference_journal.jsonl"
-    return sum(json.loads(line)["kind"] == "shot" for line in path.read_text(encoding="utf-8").splitlines())
+    whole = path.read_text(encoding="utf-8").rpartition("\n")[0]
+    return [json.loads(line) for line in whole.splitlines()]
+
+
+def train_shots(folder: Path) -> int:
+    return sum(one["kind"] == "shot" for one in preference_journal(folder))
 
 
 def test_a_train_fires_no_shot_while_the_terminal_cannot_show_what_was_typed(
@@ -359,9 +364,9 @@ def test_a_train_fires_no_shot_while_the_terminal_cannot_show_what_was_typed(
         screen.fire()
         screen.wait_for("Enter when the participant says next:")
         screen.type(f"{HELD}x")
-        time.sleep(1.0)  # a shot that was on its way is over
+        wait_for(lambda: any(one.get("body", {}).get("kind") == "paused" for one in preference_journal(tmp_path)))
         before = train_shots(tmp_path)
-        time.sleep(2.0)
+        time.sleep(1.0)  # this is how long a train would have fired on
         screen.type("!")
         assert train_shots(tmp_path) == before
         screen.type(GOES_ON)

@@ -26,6 +26,7 @@ from experiments.screens.practice_text import practice_text, round_before_text
 from experiments.session import events
 from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
+from experiments.session.judging import BEAT_S
 from experiments.session.remarks import Remark, flag_word
 from experiments.session.states import EMERGENCY, Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step
@@ -46,7 +47,7 @@ _HALTED = (
     "  Type why, and Enter; Enter alone closes the run, which can be resumed: "
 )
 _COMMANDS = ("stop", "pause", "undo", "repeat", "flag", "note", "skip", "help")
-_TICK_S, _BEAT_S = 1.0, 0.1
+_TICK_S = 1.0
 _F12 = re.compile(r"\[24(;\d+)?[~^$@]")
 """What is left on a line of the console's key for an emergency stop. What is held beside stands behind a semicolon,
 or is its last sign."""
@@ -257,7 +258,7 @@ class TerminalScreen:
         while self._live is not None and self._shown.state is not State.STOPPED:
             if self._clock.now() - self._writing_s < _HELD_S:
                 self._live.beats.beat()
-            time.sleep(_BEAT_S)
+            time.sleep(BEAT_S)
 
     def _say(self, text: str) -> None:
         self._show(f"{text}\n")
