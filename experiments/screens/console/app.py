@@ -24,10 +24,10 @@ from experiments.run_request import RunRequest
 from experiments.screens.console import view
 from experiments.screens.console.controls import Controls
 from experiments.screens.console.participant_link import ParticipantSide
+from experiments.screens.console.tone import finish_tone
 from experiments.screens.console.window import ConsoleWindow
 from experiments.screens.console.windows import (
     errors_to,
-    finish_tone,
     hear_of_grabs,
     hear_of_loss,
     on_loss,

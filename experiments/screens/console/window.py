@@ -13,9 +13,9 @@ from PyQt6.QtCore import QCoreApplication, QEvent, QTimer, pyqtSignal
 from PyQt6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 
 from experiments.clock import Clock
-from experiments.live_run import HALT_UNSAVED, LiveRun
+from experiments.live_run import LiveRun
 from experiments.record.tables import is_simulated
-from experiments.screens.console import view, widgets, windows
+from experiments.screens.console import view, widgets
 from experiments.screens.console.buttons import Buttons
 from experiments.screens.console.controls import Controls, TextField
 from experiments.screens.console.instructions import instruction
@@ -23,6 +23,8 @@ from experiments.screens.console.keys import BY_NAME, Name, Typing, own_arrows
 from experiments.screens.console.over_all import KeepsKeys, WhateverPressed
 from experiments.screens.console.panels import FITS, Bars, Notice, SidePanel, TextFields, TextPage
 from experiments.screens.console.progress import are_keys_heard, marks
+from experiments.screens.console.said_line import SaidAt, SaidLine
+from experiments.screens.console.tone import play_tone
 from experiments.screens.console.windows import Keyboard, has_keys, remember, scaled_sheet
 from experiments.screens.participant.messages import Theme
 from experiments.screens.phrases import phrase
@@ -31,15 +33,12 @@ from experiments.session.duration import RunTiming
 from experiments.session.events import Press
 from experiments.session.history import GrowingHistory, History
 from experiments.session.judging import BEAT_S
-from experiments.session.remarks import Halted, Noted
 from experiments.session.states import Position, State
-from experiments.session.steps import Failed, Prepared, Rested, trial_of
+from experiments.session.steps import Rested
 from experiments.session.tracks import Tracks, adaptive_tracks
 
 SOON_MS = 3
 """How soon news is drawn: an answer's record is on the disk by then, and what it leads to is drawn with it."""
-BRIEF_S = 4.0
-"""How long it is shown why something was refused."""
 WIDE_PX, HIGH_PX = 1280.0, 760.0
 """The size at which type has its own size."""
 SMALLEST, LARGEST = 0.55, 2.2
@@ -76,10 +75,6 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self.participant: view.ParticipantSeen | None = None
         self.ended: view.Ended | None = None
         self._progress = RunTiming()
-        self._brief_until_s: float | None = None
-        self._brief_for = -1
-        self._lasting, self._failure = ("", "good"), ""
-        self._beside: view.Trouble | None = None
         self.theme: Theme = "dark"
         self._takes_keys, self._scale = False, 0.0
         self._build()
@@ -111,6 +106,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         down = QtWidgets.QVBoxLayout(whole := QtWidgets.QWidget())
         widgets.fill(down, self.place, (across, 1), self.bars, margins=(10, 6, 10, 6))
         self.pages, self.page = QtWidgets.QStackedWidget(), TextPage()
+        self._said = SaidLine(self.saved, self.page.said)
         self.pages.addWidget(whole)
         self.pages.addWidget(self.page)
         outer, bands = QtWidgets.QVBoxLayout(central := QtWidgets.QWidget()), QtWidgets.QWidget()
@@ -141,7 +137,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             case view.ParticipantSeen():
                 self._see_participant(message)
             case view.Trouble():
-                self._trouble(message)
+                self._said.trouble(message, self._said_at())
             case view.Ended():
                 self._end(message)
         self._show_soon()
@@ -153,7 +149,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
             self.activateWindow()
         self._takes_keys = seen.starting
         if seen.failure:
-            self._forget()
+            self._said.forget()
 
     def _show_soon(self) -> None:
         if not self._soon.isActive():
@@ -174,14 +170,14 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _end(self, message: view.Ended) -> None:
         self.ended = message
-        self._forget("wait")  # what is begun is not done any more
+        self._said.forget("wait")  # what is begun is not done any more
         if message.reason is not None and message.saved is None:
-            self._forget()
+            self._said.forget()
         if self.controls is not None:
             self.controls.end()
         self.close_line()
         self.refresh()  # at once: a window that is closed in this moment has said how it ended
-        windows.play_tone()
+        play_tone()
 
     def _arrive(self) -> None:
         """Draw the newest position: its field, and where the cursor goes; a line that is being typed keeps it."""
@@ -191,68 +187,29 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         if view.typed_there(self.about, before) and not view.typed_there(self.about, self.drawn):
             self.activateWindow()  # the participant's screen took the keys
         if self.drawn.base is State.HALTED and before.base is not State.HALTED:
-            self._forget()
+            self._said.forget()
         if self.controls is not None:
             self.controls.draw(self.drawn)
-            if self.drawn.serial != self._brief_for:
-                self._unbrief()
+            self._said.at(self.drawn)
         self._progress.at(self.drawn, self.clock.now())
         self.fields.at(self.drawn, self.controls.entered_so_far() if self.controls is not None else "")
         self.fields.focus(self.drawn, self)
-
-    def _trouble(self, message: view.Trouble) -> None:
-        """Say what went wrong until something else is to be said; that it is well again for a few seconds."""
-        self._beside = message if message.trial is not None else self._beside
-        self._last("" if message.mood == "good" else message.text, message.mood)
-        if message.mood == "good":
-            self.say(message.text, message.mood)
-
-    def _forget(self, mood: str = "good") -> None:
-        """What went well before is not to stand below an emergency stop, or below what is lost."""
-        if self._lasting[1] == mood:
-            self._last("", "good")
 
     def _acknowledge(self, message: view.Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
         self._progress.saved(message.word, self.clock.now())
         text = saved_text(self.about.plan, self.seen.told, message.step, message.word)
-        if text and isinstance(message.word, Rested | Noted):
-            self.say(text, "good")  # it may be of what an answer left behind, and does not take that answer's place
-        elif text:
-            if self._beside and trial_of(message.step) not in (None, self._beside.trial):
-                self._beside = None
-            text = f"{text}\n{self._beside.text}" if self._beside else text
-            self._failure = text if isinstance(message.word, Failed) else ""
-            self._last(text, "bad" if self._failure or self._beside else "good")
-        elif self._lasting == (self._failure, "bad") and isinstance(message.word, Prepared):
-            self._last("", "good")  # it is fired anew: of that a failure before says nothing
-        elif HALT_UNSAVED in self._lasting[0] and isinstance(message.word, Halted):
-            self._last(phrase("Saved. The emergency stop is on record now."), "good")
+        self._said.saved(message, text, self._said_at())
         if isinstance(message.word, Rested):
-            windows.play_tone()
+            play_tone()
 
     def say(self, text: str, mood: str) -> None:
         """Show a line of answer, for a few seconds."""
+        self._said.say(text, mood, self._said_at())
+
+    def _said_at(self) -> SaidAt:
         position = self.drawn if self.live is None else self.live.position  # what it led to may not be drawn yet
-        self._brief_until_s, self._brief_for = self.clock.now() + BRIEF_S, position.serial
-        self._show_line(text, mood)
-
-    def _unbrief(self) -> None:
-        """Show again what was saved last."""
-        if self._brief_until_s is not None:
-            self._brief_until_s = None
-            self._show_line(*self._lasting)
-
-    def _last(self, text: str, mood: str) -> None:
-        """Show a line until the next."""
-        self._lasting = (text, mood)
-        self._brief_until_s = None
-        self._show_line(text, mood)
-
-    def _show_line(self, text: str, mood: str) -> None:
-        for label in (self.saved, self.page.said):
-            label.setText(text)
-            widgets.set_mood(label, mood)
+        return SaidAt(now_s=self.clock.now(), serial=position.serial)
 
     # showing
 
@@ -301,8 +258,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
         self.bars.put(seen)
         self.side.put(seen, self._progress)
         self.buttons.put(self.drawn, over=self.ended is not None, letters=self._typing.letters, idle=self._idle)
-        if self._brief_until_s is not None and seen.now_s > self._brief_until_s:
-            self._unbrief()
+        self._said.tick(seen.now_s)
         self._fit()
         if self.drawn.serial != self._painted:
             self._painted = self.drawn.serial

@@ -1,4 +1,4 @@
-"""What every window of the console needs of the system: its place, its keys, signals, a tone; and the display's loss.
+"""What every window of the console needs of the system: its place, its keys, signals; and the display's loss.
 
 When the display is lost, Qt says so in a warning, then calls `exit`, which can hang. The warning is heard here, so that
 the run ends in order first. Signals end a window in order too, and so do errors: an exception out of a Qt slot would
@@ -7,14 +7,11 @@ end the process, or be printed and no more.
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import signal
 import sys
-import threading
 import traceback
-from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -397,47 +394,3 @@ def key_name(event: QKeyEvent) -> str:
         return chr(key)
     is_letter = event.text().isalpha() and not event.text().isascii()
     return _DIGITS.get(place) or (_PLACES.get(place) if is_letter else None) or f"#{key}"
-
-
-RATE_Hz = 44_100
-PITCH_Hz = 880.0
-LENGTH_S = 0.35
-LOUDNESS = 0.4
-MOST_S = 3.0
-"""How long a sound system that hangs is waited for."""
-_TONE = "tone"
-
-
-def tone() -> array[float]:
-    """The tone, faded in and out so that it does not click: 32-bit samples from -1 to 1."""
-    count = int(RATE_Hz * LENGTH_S)
-    fade = RATE_Hz // 50
-    return array(
-        "f",
-        (
-            LOUDNESS * min(1.0, n / fade, (count - n) / fade) * math.sin(2 * math.pi * PITCH_Hz * n / RATE_Hz)
-            for n in range(count)
-        ),
-    )
-
-
-def play_tone() -> None:
-    """Play the tone beside everything else; silence is no error."""
-    threading.Thread(target=_play_tone, daemon=True, name=_TONE).start()
-
-
-def finish_tone() -> None:
-    """Wait until no tone is played: as the sound system opens it swallows what the program says on the terminal."""
-    for thread in threading.enumerate():
-        if thread.name == _TONE:
-            thread.join(MOST_S)
-
-
-def _play_tone() -> None:
-    try:
-        import sounddevice  # noqa: PLC0415 - opens the sound system
-
-        with sounddevice.RawOutputStream(samplerate=RATE_Hz, channels=1, dtype="float32") as stream:
-            stream.write(tone().tobytes())
-    except Exception:  # noqa: BLE001, S110 - no library, no device: `recoil doctor` says so
-        pass
