@@ -1171,6 +1171,18 @@ def test_a_repeat_that_a_busy_machine_tells_as_a_new_press_is_none_of_a_key_that
         assert fresh.eventFilter(None, event) is kept
 
 
+@pytest.mark.parametrize(("place", "acts"), [(28, True), (29, False)])
+def test_a_key_of_another_alphabet_acts_by_its_place(opened: Open, place: int, acts: bool) -> None:
+    """A keyboard of Cyrillic letters alone has the one on T's place; the one beside it is no shortcut."""
+    window = opened(gun="simulated")
+    fresh = FreshShortcuts(window)
+    event = QKeyEvent(QEvent.Type.ShortcutOverride, ord("Е"), CTRL, place, 0, 0, "е")
+    assert fresh.eventFilter(None, event) is acts
+    assert (window.pages.currentWidget() is window.shots) is acts
+    key(window, "Escape")
+    until(lambda: not window.shots.is_running)
+
+
 @pytest.mark.parametrize(("name", "title"), [("stop_button", "EMERGENCY STOP"), ("call_off_button", "Not fired")])
 def test_a_button_that_stops_a_test_shot_does_so_as_it_goes_down(opened: Open, name: str, title: str) -> None:
     """And what came of it stays there as it is let go."""

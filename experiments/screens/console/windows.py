@@ -20,7 +20,7 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, Protocol
 
-from PyQt6 import QtCore
+from PyQt6 import QtCore, QtGui
 from PyQt6.QtGui import QKeyEvent
 from PyQt6.QtWidgets import QApplication, QWidget
 
@@ -335,6 +335,7 @@ class FreshShortcuts(QtCore.QObject):
 
     def __init__(self, widget: QWidget) -> None:
         super().__init__(widget)
+        self._widget = widget
         self._presses = Presses()
         self._stale = ""
         widget.winId()  # it has no window (`QWindow`) before
@@ -354,11 +355,28 @@ class FreshShortcuts(QtCore.QObject):
             return False
         if event.type() == QtCore.QEvent.Type.ShortcutOverride and _may_be_shortcut(event):
             acts = self._presses.down(key, stamp_s, repeated=event.isAutoRepeat())
-            self._stale = "" if acts else key
-            event.setAccepted(not acts)
+            taken = not acts or self._act_by_place(event, key)
+            self._stale = key if taken else ""
+            event.setAccepted(taken)
         elif event.type() == QtCore.QEvent.Type.ShortcutOverride:
             self._stale = ""
         return key == self._stale
+
+    def _act_by_place(self, event: QKeyEvent, key: str) -> bool:
+        """Activate the shortcut of a key whose alphabet has no such letter: Qt, which looks for letters, finds none."""
+        if event.key() < _ASCII_END or key not in _PLACES.values():
+            return False
+        wanted = QtGui.QKeySequence(QtCore.QKeyCombination(event.modifiers(), QtCore.Qt.Key(ord(key))))
+        there = [one for one in self._widget.findChildren(QtGui.QShortcut) if one.key() == wanted and _is_active(one)]
+        if len(there) == 1:
+            there[0].activated.emit()
+        return len(there) == 1
+
+
+def _is_active(shortcut: QtGui.QShortcut) -> bool:
+    """Whether a shortcut of a window that has the keys acts."""
+    parent = shortcut.parent()
+    return shortcut.isEnabled() and isinstance(parent, QWidget) and parent.isVisible() and parent.isEnabled()
 
 
 def _may_be_shortcut(event: QKeyEvent) -> bool:
