@@ -184,14 +184,15 @@ def check_resumable(request: RunRequest) -> None:
 def _check_same_answerer(request: RunRequest, where: Place) -> None:
     """`PlaceError` if a synthetic participant would go on for a person, or a person for a synthetic one."""
     contents = begun(where.journal)
-    told = () if contents is None else history(contents)
-    hands = {word.by for _, word in told if isinstance(word, Answered)}
-    if hands and request.simulated != (hands == {"synthetic"}):
-        who, other = (
-            ("a person", "a synthetic participant") if request.simulated else ("a synthetic participant", "you")
+    if contents is None:
+        return
+    hands = [word.by for _, word in history(contents) if isinstance(word, Answered)]
+    if {one == "synthetic" for one in (contents.head.participant, *hands)} != {request.simulated}:
+        whose, other = (
+            ("a person's", "a synthetic participant") if request.simulated else ("a synthetic participant's", "you")
         )
         raise PlaceError(
-            f"{where.journal}: {who} has answered this run so far, and {other} would go on with it; choose the screen "
+            f"{where.journal}: this run is {whose} so far, and {other} would go on with it; choose the screen "
             "that it began at, or another participant"
         )
 
@@ -400,7 +401,7 @@ def begins_halted(where: Place, before: Contents | None, gun: str) -> bool:
 def owes_shot(results: Path, address: str) -> bool:
     """Whether an emergency stop beside all runs left a gun at an address a test shot that it still owes."""
     owed = [one for one in owed_shots(results) if one.address in ("", address)]
-    return any(not one.gun or max(_words_on(one.gun, results))[1] for one in owed)
+    return any(not one.gun or max(_words_on(one.gun, results), default=("", False))[1] for one in owed)
 
 
 def _words_on(gun: str, results: Path, own: Path | None = None) -> Iterator[tuple[str, bool]]:
@@ -417,9 +418,9 @@ def _words_on(gun: str, results: Path, own: Path | None = None) -> Iterator[tupl
 
 
 def _serials(gun: str) -> list[bytes]:
-    """How a journal may hold the serial number of a gun of this name, quickly found: what stands behind a colon."""
+    """How a journal may hold the serial number of a gun of this name, quickly found: it, or what is behind a colon."""
     parts = gun.split(":")
-    found = [":".join(parts[first:]) for first in range(1, len(parts))] or [gun]
+    found = [":".join(parts[first:]) for first in range(len(parts))]
     return [b'"serial":' + json.dumps(one, ensure_ascii=False).encode() for one in found]
 
 

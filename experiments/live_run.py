@@ -36,7 +36,7 @@ HALT_UNSAVED = (
 CORRECTION_UNSAVED = "a correction could not be saved: enter it anew (undo) when the run goes on"
 
 
-def _answer_unsaved(step: Asking) -> str:
+def _unsaved_text(step: Asking) -> str:
     """What is said of an answer that the disk refused."""
     trial = step.trial
     where = f"session {trial.session}, set {trial.set}, trial {trial.trial}"
@@ -336,7 +336,7 @@ class LiveRun:
             written.result()
         except JournalError as error:
             if isinstance(outcome, Answered) and isinstance(step, Asking) and not isinstance(error, JournalGone):
-                self._answer_unsaved = _answer_unsaved(step)
+                self._answer_unsaved = _unsaved_text(step)
             raise
         with self.news:
             self._history.append((step, outcome))

@@ -17,7 +17,7 @@ from experiments.screens.texts import doubt_text
 from experiments.study import enrolment
 from experiments.study.folders import Overview, StudyFolder, known_codes, open_study, overview
 from experiments.study.register import read_register
-from experiments.study.study import Facts, Participant, RunProgress, eligible, taking_part
+from experiments.study.study import Facts, Participant, RunProgress, eligible, taking_part, why_nobody
 
 _OPTIONS = {"age_years": "--age", "sex": "--sex", "handedness": "--handedness"}
 _REASONED = {"exclude": enrolment.exclude, "left": enrolment.leave, "readmit": enrolment.readmit}
@@ -179,7 +179,7 @@ def _count_lines(found: StudyStatus) -> Iterator[str]:
 def _next_lines(found: StudyStatus) -> Iterator[str]:
     coming = found.overview.next
     if coming is None:
-        yield f"Next: {_nobody(taking_part(found.overview.participants))}"
+        yield f"Next: {_nobody(found.overview.participants)}"
         return
     yield f"Next: {coming.participant_id}{' (new)' if coming.new else ''}"
     for run in coming.runs:
@@ -188,8 +188,11 @@ def _next_lines(found: StudyStatus) -> Iterator[str]:
         yield f"  {run.experiment}: {' > '.join(methods) if methods else 'order drawn when the run begins'}{go_on}"
 
 
-def _nobody(people: list[Participant]) -> str:
-    if any(run.state == "unreadable" for one in people for run in one.runs):
-        return "nobody who can be named, see what could not be read"
-    elsewhere = [one.participant_id for one in people if one.is_elsewhere]
-    return f"nobody waits; at a console now: {', '.join(elsewhere)}" if elsewhere else "nobody, the study is done"
+def _nobody(people: tuple[Participant, ...]) -> str:
+    match why_nobody(people):
+        case "unreadable", _:
+            return "nobody who can be named, see what could not be read"
+        case "elsewhere", codes:
+            return f"nobody waits; at a console now: {', '.join(codes)}"
+        case _:
+            return "nobody, the study is done"

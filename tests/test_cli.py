@@ -9,12 +9,16 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from experiments.config.setup import canonical_json
-from experiments.load import shipped_folder
+from experiments.earlier_run import check_resumable
+from experiments.load import load_setup, shipped_folder
 from experiments.record.journal import link_of
+from experiments.run_request import RunRequest
+from experiments.study.folders import PlaceError
 from tests.conftest import Recoil, refused
 from tests.waiting import PATIENCE_S
 
@@ -113,7 +117,24 @@ def test_nobody_goes_on_for_a_person_whom_a_simulation_would_replace(recoil: Rec
     lines = journal.read_bytes().splitlines(keepends=True)
     begun = b"".join(lines[:8]).replace(b'"by":"synthetic"', b'"by":"participant"')
     journal.write_bytes(_relinked(begun))
-    refused(synthetic(recoil, "--resume"), "a person has answered this run so far", "or another participant")
+    refused(synthetic(recoil, "--resume"), "this run is a person's so far", "or another participant")
+
+
+@pytest.mark.parametrize("began", ["synthetic", "person"])
+def test_nobody_goes_on_for_another_kind_of_participant_who_has_answered_nothing_yet(
+    recoil: Recoil, tmp_path: Path, began: Literal["person", "synthetic"]
+) -> None:
+    """Else a person's run would count as a synthetic one, and give way to the next person's."""
+    synthetic(recoil)
+    journal = tmp_path / JOURNAL
+    head = journal.read_bytes().splitlines(keepends=True)[0]
+    journal.write_bytes(_relinked(head.replace(b'"participant":"synthetic"', f'"participant":"{began}"'.encode())))
+    screen, whose = ("synthetic", "a person's") if began == "person" else ("terminal", "a synthetic participant's")
+    request = RunRequest(
+        setup=load_setup("direction"), participant_id="P01", results=tmp_path / "results", screen=screen
+    )
+    with pytest.raises(PlaceError, match=f"this run is {whose} so far"):
+        check_resumable(request)
 
 
 def _relinked(journal: bytes) -> bytes:

@@ -548,7 +548,7 @@ class Day:
         self.begin(trial)
         self.now_s += duration_s
         self.told.append((ask(trial), SAID))
-        self.so_far.saved(SAID, self.now_s)
+        self.so_far.saved(ask(trial), SAID, self.now_s)
 
     @property
     def left_s(self) -> float:
@@ -582,6 +582,22 @@ def test_a_pause_does_not_count_as_a_trials_time(pause_s: float) -> None:
     for one in (day, quick):
         one.answer(first, 15.0)
     assert day.left_s == pytest.approx(quick.left_s)
+
+
+def test_a_trial_lasts_until_the_last_question_that_is_asked_at_once() -> None:
+    trial, so_far = plan_of(DIRECTION).trials[0], RunTiming()
+    so_far.at(Position(states=(State.PREPARING,), step=prepare(trial)), 100.0)
+    for step, word, now_s in (
+        (present(trial), SHOWN, 110.0),
+        (ask(trial), SAID, 117.0),
+        (replace(rate(trial), later=False), SAID, 125.0),
+        (rate(trial), SAID, 190.0),
+    ):
+        so_far.saved(step, word, now_s)
+    assert so_far.measured_s == [25.0]
+    so_far.at(Position(states=(State.PREPARING,), step=prepare(trial)), 200.0)
+    so_far.saved(present(trial), SHOWN, 204.0)
+    assert so_far.measured_s == [25.0, 4.0]
 
 
 def test_a_break_that_is_on_counts_as_what_is_left_of_it_and_stands_still_in_a_pause() -> None:

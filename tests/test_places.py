@@ -117,6 +117,12 @@ def test_set_aside_files_are_renamed_and_never_written_over(tmp_path: Path) -> N
     )
 
 
+def test_the_files_of_one_run_get_one_number(tmp_path: Path) -> None:
+    a_run(tmp_path, "without a table").table.unlink()
+    set_aside(place(tmp_path, "P01", "direction"))
+    assert [file.name.split(".")[1] for file in set_aside(a_run(tmp_path, "2"))] == ["aside-2", "aside-2"]
+
+
 def test_setting_aside_what_is_not_there_does_nothing(tmp_path: Path) -> None:
     assert set_aside(place(tmp_path, "P01", "direction")) == []
     where = a_run(tmp_path, "1")

@@ -234,7 +234,7 @@ def test_a_pipe_that_is_called_a_register_keeps_nobody_waiting(tmp_path: Path) -
 def test_a_register_held_by_another_program_is_waited_for_and_then_left(
     results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(register, "_PAUSE_S", 0.001)
+    monkeypatch.setattr(register, "_PATIENCE_S", 0.1)
     holder = storage.reopen(results / REGISTER_FILE)
     assert storage.hold(holder)
     before = lines_of(results)

@@ -406,6 +406,21 @@ def test_the_folder_of_somebody_who_began_just_now_is_missed(
     assert (window.choice is None) is (ends != "never began")
 
 
+@pytest.mark.parametrize(("done", "says"), [((), "Next: preference."), (("preference",), "Thank the participant.")])
+def test_what_a_window_says_comes_next_is_what_the_participant_has_not_done(
+    done: tuple[str, ...], says: str, study: StudyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for experiment in done:
+        do(study, "P01", experiment)
+    request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results)
+    choices, told = [request, None], list[str]()
+    monkeypatch.setattr(live, "choose_run", lambda *_: choices.pop(0))
+    monkeypatch.setattr(live, "run_live", lambda *_, last, **__: told.append(last))
+    monkeypatch.setattr(live, "study_of", lambda _: study)
+    live.lab_day(request, (), lambda *_: nullcontext())
+    assert told == [says]
+
+
 def test_nobody_begins_where_the_register_is_gone_which_says_who_is_excluded(opened: Open, study: StudyFolder) -> None:
     do(study, "P01", records=20)
     join(study, "P01")

@@ -10,6 +10,7 @@ from pathlib import Path, PurePath
 
 from device.messages import RecoilError, escaped, first_few
 from experiments.record import storage, tables
+from experiments.record.names import is_practice
 
 ARCHIVE_FILE = "archive.json"
 """What a folder that is an archive has, beside the results in it."""
@@ -139,8 +140,8 @@ def _is_journal(path: str) -> bool:
 
 def _is_counted(path: str) -> bool:
     """Whether a file may hold data: a practice holds none, nor does a register."""
-    name = _name(path).lower()
-    return "practice" not in name and (not name.endswith(_JOURNALS) or _is_journal(name))
+    name = _name(path)
+    return not is_practice(name) and (not name.endswith(_JOURNALS) or _is_journal(name))
 
 
 def _real(path: Path) -> str:

@@ -106,6 +106,7 @@ class PsychometricFit(Result):
 
         `ValueError`: a share that no function reaches.
         """
+        share = single(share, "share")
         if not 0 < share < 1:
             raise ValueError(f"share must be above 0 and below 1, not {share:g}")
         return _estimate(_at(self.draws, share, self.shape), self.confidence, self._axis.back)

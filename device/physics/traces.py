@@ -21,9 +21,7 @@ from device.parameters import GunParameters
 from device.physics.equations import (
     BREAK_AWAY,
     COIL,
-    DRIVE_CHANGE,
     FREE,
-    GIVEN_UP,
     MAX_SEGMENTS,
     MAX_WORK,
     SETTLED,
@@ -46,11 +44,10 @@ from device.physics.segments import (
     free_position,
     free_velocity,
     half_of,
-    pulse_off,
     pulse_on,
     resting_current,
 )
-from device.physics.shot import ShotSummary, simulate
+from device.physics.shot import ShotSummary, goes_on, simulate
 
 _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoil stage
 FARTHEST_IN_TRACE = 1e-11
@@ -120,11 +117,8 @@ def segments(constants: Constants) -> Iterator[Segment]:
         event = advance(constants, s, w)
         yield _segment(constants, began, s, w, event)
         w.work += 1
-        if event in (SETTLED, GIVEN_UP) or (event == DRIVE_CHANGE and s.drive_until == s.until) or w.work > MAX_WORK:
+        if w.work > MAX_WORK or not goes_on(constants, s, event):
             return
-        if event == DRIVE_CHANGE:
-            pulse_off(constants, s)
-        enter(constants, s, event)
 
 
 _Began = tuple[int, float, float, bool, float, tuple[float, float, float]]

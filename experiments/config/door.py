@@ -301,8 +301,12 @@ def participant_codes(count: int, prefix: str = "P") -> list[str]:
     >>> participant_codes(2)
     ['P01', 'P02']
     """
-    width = max(2, len(str(count)))
-    return [f"{prefix}{number:0{width}d}" for number in range(1, count + 1)]
+    return [numbered_code(number, count, prefix) for number in range(1, count + 1)]
+
+
+def numbered_code(number: int, count: int, prefix: str) -> str:
+    """The code of one of so many participants."""
+    return f"{prefix}{number:0{max(2, len(str(count)))}d}"
 
 
 def leaves(model: BaseModel, prefix: str = "") -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,32 @@ JOURNAL_NAME = re.compile(rf"sub-({CODE})_task-([a-z]+)(_practice)?_journal(\.as
 def is_code(text: str) -> bool:
     """Whether a text can be a participant's code."""
     return _CODE.fullmatch(text) is not None
+
+
+def is_practice(name: str) -> bool:
+    """Whether a file is of a practice, by its name; of one that is not named as runs are, if the word is in it.
+
+    >>> is_practice("sub-P01_task-direction_practice_trials.csv"), is_practice("Practice of P01.csv")
+    (True, True)
+    >>> is_practice("sub-practice1_task-practice_trials.csv")
+    False
+    """
+    ours = _RUN_FILE.match(name)
+    return bool(ours[1]) if ours else "practice" in name.lower()
+
+
+_RUN_FILE = re.compile(rf"sub-{CODE}_task-[a-z]+(_practice)?_")
+
+
+def twin_text(code: str, known: Iterable[str], where: Path) -> str:
+    """What to do about a code that differs from a known one in case alone; empty if it does not."""
+    for other in known:
+        if other != code and other.lower() == code.lower():
+            return (
+                f"participant code {code!r} differs from {other!r} in {where} in case alone; "
+                f"use {other!r} if it is the same person, else another code"
+            )
+    return ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

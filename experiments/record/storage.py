@@ -352,10 +352,15 @@ def _take_away_parts(path: Path) -> None:
 
 def set_aside_file(path: Path) -> Path:
     """Rename a file, or a folder, to the first free `NAME.aside-N`. Returns the new name."""
+    return set_aside_files(path)[0]
+
+
+def set_aside_files(*paths: Path) -> list[Path]:
+    """The same of files that belong together: those that are there get one N, which is free for all."""
     number = 1
-    while os.path.lexists(_aside(path, number)):
+    while any(os.path.lexists(_aside(path, number)) for path in paths):
         number += 1
-    return path.rename(_aside(path, number))
+    return [path.rename(_aside(path, number)) for path in paths if os.path.lexists(path)]
 
 
 def _aside(path: Path, number: int) -> Path:

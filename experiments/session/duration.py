@@ -12,7 +12,7 @@ from experiments.session import steps
 from experiments.session.history import History, answered, done
 from experiments.session.remarks import Remark
 from experiments.session.states import Position, State
-from experiments.session.steps import Outcome
+from experiments.session.steps import Asking, Outcome, Step
 
 PRIOR_TRIALS = 5
 """The plan counts as much as so many measured trials, so that the estimate does not jump with the first."""
@@ -23,11 +23,12 @@ ROUGH_S = 1200.0
 
 @dataclass(slots=True)
 class RunTiming:
-    """Measures how long trials take, without the time of pauses."""
+    """Measures how long trials take, without the time of pauses, up to the last question that is asked at once."""
 
     began_s: float | None = None
     measured_s: list[float] = field(default_factory=list)
     _trial_s: float | None = None
+    _is_measured: bool = False
     _paused_s: float = 0.0
     _pause_began_s: float | None = None
 
@@ -35,19 +36,23 @@ class RunTiming:
         """Take a new position."""
         if self.began_s is None and position.step is not None:
             self.began_s = now_s
-        if position.state in (State.SETTING, State.PREPARING) and self._trial_s is None:
-            self._trial_s, self._paused_s = now_s, 0.0
+        if position.state in (State.SETTING, State.PREPARING) and (self._trial_s is None or self._is_measured):
+            self._trial_s, self._paused_s, self._is_measured = now_s, 0.0, False
         if position.paused_s is not None:
             self._pause_began_s = position.paused_s
         elif self._pause_began_s is not None:
             self._paused_s += now_s - self._pause_began_s
             self._pause_began_s = None
 
-    def saved(self, word: Outcome | Remark, now_s: float) -> None:
-        """Take what was saved: a trial is over with its answer, or with its stimulus where answers come at the end."""
-        if isinstance(word, steps.Answered | steps.Presented) and self._trial_s is not None:
+    def saved(self, step: Step | None, word: Outcome | Remark, now_s: float) -> None:
+        """Take what was saved: a trial is over with its last answer, or its stimulus where answers come at the end."""
+        answers = isinstance(word, steps.Answered) and isinstance(step, Asking) and not step.later
+        if (answers or isinstance(word, steps.Presented)) and self._trial_s is not None:
+            if self._is_measured:
+                self.measured_s.pop()
             self.measured_s.append(now_s - self._trial_s - self._paused_s)
-        if isinstance(word, steps.Answered | steps.Presented | steps.Rested):
+            self._is_measured = True
+        if isinstance(word, steps.Rested):
             self._trial_s = None
 
     def elapsed_s(self, now_s: float) -> float:

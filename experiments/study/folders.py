@@ -23,7 +23,7 @@ from experiments.load import load_setup, load_study, shipped_folder
 from experiments.record import journal, storage, tables
 from experiments.record.head_design import began_with
 from experiments.record.journal import Contents, Head, JournalError
-from experiments.record.names import Place, is_code, participant_folder
+from experiments.record.names import Place, is_code, participant_folder, twin_text
 from experiments.study import register
 from experiments.study.balance import group_of_next_run, is_balanced, row_of_next_run
 from experiments.study.preregistration import (
@@ -68,12 +68,8 @@ def place(results: Path, participant_id: str, experiment: str, registered: Regis
 
 def check_case(results: Path, participant_id: str, known: Iterable[str]) -> None:
     """`PlaceError`, if a code differs from a known one in case alone."""
-    for code in known:
-        if code != participant_id and code.lower() == participant_id.lower():
-            raise PlaceError(
-                f"participant code {participant_id!r} differs from {code!r} in {results} in case alone; "
-                f"use {code!r} if it is the same person, else another code"
-            )
+    if said := twin_text(participant_id, known, results):
+        raise PlaceError(said)
 
 
 def known_codes(results: Path, registered: Register) -> list[str]:
@@ -113,7 +109,7 @@ def refuse_gone(results: Path, had: Collection[Path], participant_id: str) -> No
 
 def set_aside(run: Place) -> list[Path]:
     """Rename a run's files so that a fresh one can begin; nothing is lost. Returns the new names."""
-    return [storage.set_aside_file(path) for path in (run.journal, run.table, run.shots) if path.exists()]
+    return storage.set_aside_files(run.journal, run.table, run.shots)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,6 @@ record of a code corrects the facts of an earlier one; nothing is ever taken awa
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -24,12 +23,13 @@ from experiments.config.setup import canonical_json
 from experiments.record import storage
 from experiments.record.journal import JournalError, link_of
 from experiments.record.lines import LineError, check_chain, parsed_line
+from experiments.record.names import twin_text
 from experiments.study.study import Facts, Member
 
 REGISTER_FILE = "participants.jsonl"
 MAX_REASON = 200
 _DAMAGED = "the register was changed or damaged: restore it from a copy, or rename it and enter the participants anew"
-_TRIES, _PAUSE_S = 100, 0.05
+_PATIENCE_S = 5.0
 """How often, and how long apart, a register that another console holds is tried: it is held for one record only."""
 
 
@@ -219,12 +219,8 @@ def append(results: Path, one: RegisterEntry, clock: Clock) -> None:
 
 
 def _refuse_twin(before: Register, one: RegisterEntry) -> None:
-    for known in before.members:
-        if known != one.participant_id and known.lower() == one.participant_id.lower():
-            raise RegisterError(
-                f"participant code {one.participant_id!r} differs from {known!r} in {before.path} in case alone; "
-                f"use {known!r} if it is the same person, else another code"
-            )
+    if said := twin_text(one.participant_id, before.members, before.path):
+        raise RegisterError(said)
 
 
 def _is_known(before: Register, one: RegisterEntry) -> bool:
@@ -251,7 +247,8 @@ def _held(path: Path) -> Iterator[int]:
     except OSError as error:
         raise RegisterError(f"{path}: cannot be opened ({error.strerror}); nothing was added") from error
     try:
-        _wait_for(path, descriptor)
+        if not storage.hold(descriptor, _PATIENCE_S):
+            raise RegisterError(f"{path}: another program has held it for {_PATIENCE_S:g} s; close that one first")
         yield descriptor
     finally:
         os.close(descriptor)
@@ -261,11 +258,3 @@ def _opened(path: Path) -> int:
     with suppress(FileExistsError):
         return storage.create(path)
     return storage.reopen(path)
-
-
-def _wait_for(path: Path, descriptor: int) -> None:
-    for _ in range(_TRIES):
-        if storage.hold(descriptor):
-            return
-        time.sleep(_PAUSE_S)
-    raise RegisterError(f"{path}: another program has held it for {_TRIES * _PAUSE_S:g} s; close that one first")

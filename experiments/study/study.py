@@ -8,7 +8,16 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Literal, get_args
 
-from experiments.config.door import AgeYears, EligibilityConfig, Fact, Handedness, Model, Sex, StudyConfig
+from experiments.config.door import (
+    AgeYears,
+    EligibilityConfig,
+    Fact,
+    Handedness,
+    Model,
+    Sex,
+    StudyConfig,
+    numbered_code,
+)
 from experiments.record.tables import DataKind
 
 RunState = Literal["done", "in progress", "open elsewhere", "not begun", "unreadable", "synthetic"]
@@ -172,6 +181,19 @@ def who_is_next(
     return NextParticipant(participant_id=free_code(study, taken), new=True, runs=runs)
 
 
+def why_nobody(people: Sequence[Participant]) -> tuple[Literal["unreadable", "elsewhere", "done"], list[str]]:
+    """Why nobody is next, and whom that is about: runs cannot be read, people sit at other consoles, or all is done.
+
+    Of a study of which nobody is seen, nothing could be read.
+    """
+    counted = taking_part(people)
+    unread = [one.participant_id for one in counted if any(run.state == "unreadable" for run in one.runs)]
+    elsewhere = [one.participant_id for one in counted if one.is_elsewhere]
+    if unread or not counted:
+        return "unreadable", unread
+    return ("elsewhere", elsewhere) if elsewhere else ("done", [])
+
+
 def free_code(study: StudyConfig, taken: Collection[str]) -> str:
     """The first code of the study that nobody has, upper and lower case alike; also beyond the planned number.
 
@@ -179,8 +201,7 @@ def free_code(study: StudyConfig, taken: Collection[str]) -> str:
     'P03'
     """
     lowered = {code.lower() for code in taken}
-    width = max(2, len(str(study.participants)))
-    codes = (f"{study.code_prefix}{number:0{width}d}" for number in count(1))
+    codes = (numbered_code(number, study.participants, study.code_prefix) for number in count(1))
     return next(code for code in codes if code.lower() not in lowered)
 
 

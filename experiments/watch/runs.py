@@ -163,7 +163,7 @@ class RunSoFar:
                 self._open = ()
                 step, word = next(words)
                 self._told.append((step, word))
-                self._timing.saved(word, record.monotonic_s)
+                self._timing.saved(step, word, record.monotonic_s)
                 self._note(word, record)
             case "remark" | "measured":
                 _, word = next(words)

@@ -1,6 +1,7 @@
 """The table `[procedure]` of a design: how the levels of a factor are chosen, from the answers so far.
 
-What a table can tell by itself is checked here; what it must agree on with the rest of the design, in `tracks`.
+What a table can tell by itself is checked here; what it must agree on with the rest of the design, in
+`procedure_problems`.
 """
 
 from __future__ import annotations

@@ -41,7 +41,8 @@ from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, Question
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
-from experiments.study.folders import PlaceError, StudyFolder, progress_of
+from experiments.study.enrolment import left_to_do
+from experiments.study.folders import PlaceError, StudyFolder, look_at, progress_of
 
 
 def run_live(request: RunRequest, *, last: str = THANK_PARTICIPANT, halts: bool = False) -> Finished:
@@ -124,10 +125,13 @@ def _band_and_last(request: RunRequest, last: str) -> tuple[str, str]:
     return "", last
 
 
-def _what_is_next(study: StudyFolder, experiment: str) -> str:
-    """What comes after an experiment of a study."""
-    later = study.experiments[study.experiments.index(experiment) + 1 :]
-    return phrase("Next: {later}.", later=later[0]) if later else THANK_PARTICIPANT
+def _what_is_next(study: StudyFolder, choice: RunRequest) -> str:
+    """What somebody has still to do after a run. `PlaceError`, `JournalError` as of `look_at`."""
+    if choice.training:
+        return THANK_PARTICIPANT
+    person, _ = look_at(study, choice.participant_id)
+    left = [one for one in left_to_do(person, study.experiments) if one != choice.setup.config.experiment]
+    return phrase("Next: {later}.", later=left[0]) if left else THANK_PARTICIPANT
 
 
 def _of_the_day(
@@ -156,7 +160,7 @@ WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_
 def _carried_out(choice: RunRequest, study: StudyFolder, had: set[Path], *, halts: bool) -> str:
     own = set[Path]() if choice.training else {participant_folder(choice.results, choice.participant_id)}
     try:
-        run_live(gone_on_with(choice), last=_what_is_next(study, choice.setup.config.experiment), halts=halts)
+        run_live(gone_on_with(choice), last=_what_is_next(study, choice), halts=halts)
         had |= own
     except RunStopped as stop:
         had |= own

@@ -11,7 +11,7 @@ from experiments.screens.phrases import phrase
 from experiments.screens.texts import doubt_text
 from experiments.study.enrolment import Entered, code_doubt, left_to_do, passed_over, run_of
 from experiments.study.folders import Overview, PlaceError, StudyFolder, refuse_gone
-from experiments.study.study import Participant, RunProgress, taking_part
+from experiments.study.study import Participant, RunProgress, why_nobody
 
 _CELL = {"done": "done", "not begun": "–", "unreadable": phrase("cannot be read"), "synthetic": "synthetic"}
 
@@ -60,16 +60,13 @@ def coming_text(seen: Overview) -> str:
             new=new,
             experiment=" and ".join(run.experiment for run in seen.next.runs),
         )
-    counted = taking_part(seen.participants)
-    elsewhere = [one.participant_id for one in counted if one.is_elsewhere]
-    if elsewhere:
-        return phrase("Nobody waits; at another console now: {elsewhere}.", elsewhere=", ".join(elsewhere))
-    done = counted and all(run.state == "done" for one in counted for run in one.runs)
-    return (
-        phrase("Everyone has done everything.")
-        if done
-        else phrase("Nobody can be named next: see what cannot be read.")
-    )
+    match why_nobody(seen.participants):
+        case "unreadable", _:
+            return phrase("Nobody can be named next: see what cannot be read.")
+        case "elsewhere", codes:
+            return phrase("Nobody waits; at another console now: {elsewhere}.", elsewhere=", ".join(codes))
+        case _:
+            return phrase("Everyone has done everything.")
 
 
 def changed_text(seen: Overview) -> str:

@@ -197,7 +197,7 @@ class ConsoleWindow(QtWidgets.QMainWindow):
 
     def _acknowledge(self, message: view.Saved) -> None:
         """Say that it is safe; a tone at the end of a break."""
-        self._progress.saved(message.word, self.clock.now())
+        self._progress.saved(message.step, message.word, self.clock.now())
         text = saved_text(self.about.plan, self.seen.told, message.step, message.word)
         self._said.saved(message, text, self._said_at())
         if isinstance(message.word, Rested):
