@@ -230,9 +230,9 @@ def run_lab_day(request: RunRequest, wanted: LanguageOptions = LanguageOptions()
     request = replace(request, language=wanted.language(request.setup), catalogues=wanted.folder)
     _say_beforehand(request)
     with _needs_gui():
-        from experiments.screens.console import live  # noqa: PLC0415 - Qt is an extra, and slow
+        from experiments.screens.console import lab_day  # noqa: PLC0415 - Qt is an extra, and slow
     try:
-        live.lab_day(request, wanted.usable(_say), _markers)
+        lab_day.lab_day(request, wanted.usable(_say), _markers)
     except KeyboardInterrupt as signalled:
         _say(f"ended by {signalled}")
         raise

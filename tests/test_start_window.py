@@ -34,10 +34,10 @@ from experiments.record.journal import JournalError, hold_journal
 from experiments.record.owed_shot import OWED_FILE, OwedShot, owe_shot, owed_shots, shot_was_fired
 from experiments.run import run
 from experiments.run_request import ParticipantOptions, RunRequest
-from experiments.screens.console import live, shot_check, widgets
+from experiments.screens.console import lab_day, shot_check, widgets
 from experiments.screens.console.app import application
 from experiments.screens.console.form import Opening, PeopleTable
-from experiments.screens.console.live import study_of
+from experiments.screens.console.lab_day import study_of
 from experiments.screens.console.shot_check import HUNG
 from experiments.screens.console.start import NOTHING_ARMED, StartWindow
 from experiments.screens.console.windows import FreshShortcuts
@@ -327,9 +327,9 @@ def test_after_an_emergency_stop_the_next_window_says_that_a_test_shot_comes_fir
         stop.halted = halted
         raise stop
 
-    monkeypatch.setattr(live, "choose_run", choose)
-    monkeypatch.setattr(live, "run_live", stops)
-    live.lab_day(request, (), lambda *_: nullcontext())
+    monkeypatch.setattr(lab_day, "choose_run", choose)
+    monkeypatch.setattr(lab_day, "run_live", stops)
+    lab_day.lab_day(request, (), lambda *_: nullcontext())
     assert "P01 stopped: emergency stop practised." in told[1]
     assert ("Whatever they do next begins with a test shot" in told[1]) is halted
     assert told[1].endswith(", and so does the next run on that gun.") is (halted and gun == SERIAL)
@@ -397,9 +397,9 @@ def test_the_folder_of_somebody_who_began_just_now_is_missed(
         if ends != "finished":
             raise RunStopped("moved") if ends == "stopped" else PlaceError("no gun")
 
-    monkeypatch.setattr(live, "choose_run", choose)
-    monkeypatch.setattr(live, "run_live", runs)
-    live.lab_day(request, (), lambda *_: nullcontext())
+    monkeypatch.setattr(lab_day, "choose_run", choose)
+    monkeypatch.setattr(lab_day, "run_live", runs)
+    lab_day.lab_day(request, (), lambda *_: nullcontext())
     window = opened(had=openings[1].had)  # where their folder is not
     fill(window, "P01")
     key(window, "Return", CTRL)
@@ -414,10 +414,10 @@ def test_what_a_window_says_comes_next_is_what_the_participant_has_not_done(
         do(study, "P01", experiment)
     request = RunRequest(setup=study.setups[0], participant_id="P01", results=study.results)
     choices, told = [request, None], list[str]()
-    monkeypatch.setattr(live, "choose_run", lambda *_: choices.pop(0))
-    monkeypatch.setattr(live, "run_live", lambda *_, last, **__: told.append(last))
-    monkeypatch.setattr(live, "study_of", lambda _: study)
-    live.lab_day(request, (), lambda *_: nullcontext())
+    monkeypatch.setattr(lab_day, "choose_run", lambda *_: choices.pop(0))
+    monkeypatch.setattr(lab_day, "run_live", lambda *_, last, **__: told.append(last))
+    monkeypatch.setattr(lab_day, "study_of", lambda _: study)
+    lab_day.lab_day(request, (), lambda *_: nullcontext())
     assert told == [says]
 
 

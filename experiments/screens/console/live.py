@@ -1,48 +1,37 @@
-"""Runs at the console with what belongs to them: start window, participant's screen, synthetic participant."""
+"""A run at the console with what belongs to it: an unfinished one, participant's screen, synthetic participant."""
 
 from __future__ import annotations
 
-import tempfile
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 from typing import TypeVar
 
 from PyQt6.QtCore import QEventLoop, Qt, QTimer
 from PyQt6.QtGui import QGuiApplication
 from PyQt6.QtWidgets import QDialog, QLabel, QPushButton, QVBoxLayout
 
-from device.messages import RecoilError
-from experiments.catalogues.catalogue import Language
 from experiments.clock import RealClock
-from experiments.config.setup import Setup
-from experiments.design.config import DesignConfig
 from experiments.design.shown_texts import setup_in
-from experiments.earlier_run import NotAsItBegan, UnfinishedRun, gone_on_with
-from experiments.live_run import RunStopped
-from experiments.load import load_setup, load_study
+from experiments.earlier_run import UnfinishedRun, gone_on_with
 from experiments.record.journal import JournalError
-from experiments.record.names import participant_folder
 from experiments.run import Finished
 from experiments.run_request import Again, RunRequest
 from experiments.screens.console import people, widgets
 from experiments.screens.console.app import Console, application
-from experiments.screens.console.form import SENDS_MARKERS, Opening, monitors
+from experiments.screens.console.form import monitors
 from experiments.screens.console.over_all import AnyHeld
 from experiments.screens.console.participant_link import ParticipantSide, noise_of
 from experiments.screens.console.participant_opening import check_font, check_own_keys, look_of
-from experiments.screens.console.start import SIMULATED, choose_run
 from experiments.screens.console.view import THANK_PARTICIPANT
 from experiments.screens.console.visual_participant import VisualParticipant, open_rater
 from experiments.screens.console.widgets import SET_ASIDE, WHY, Option, QuestionBox, TextLines, start_sheet
 from experiments.screens.console.windows import FreshShortcuts, let_go, signals_to
 from experiments.screens.participant.link import ParticipantError, ParticipantLink
 from experiments.screens.phrases import phrase
-from experiments.study.enrolment import left_to_do
-from experiments.study.folders import PlaceError, StudyFolder, look_at, progress_of
+from experiments.study.folders import PlaceError, progress_of
 
 
 def run_live(request: RunRequest, *, last: str = THANK_PARTICIPANT, halts: bool = False) -> Finished:
@@ -77,38 +66,6 @@ def _carry_out(request: RunRequest, last: str, *, halts: bool) -> Finished:
         return console.run()
 
 
-OpenMarkers = Callable[[Path, Callable[[str], None]], AbstractContextManager[None]]
-"""Has the runs of a results folder sent to Lab Streaming Layer meanwhile; what is in the way is said."""
-
-
-def lab_day(request: RunRequest, languages: tuple[Language, ...], markers: OpenMarkers) -> None:
-    """One run after the other from the start window, until it is closed.
-
-    `request` says what all have in common, and what is ticked at first; `languages` which there are to choose from.
-    `KeyboardInterrupt` if a signal ended it.
-    """
-    application()
-    check_monitor(request.options.monitor)
-    study, named = study_of(request), request.setup.config.experiment
-    opening = Opening(
-        gun=request.gun,
-        named=named,
-        languages=languages,
-        language=request.language.code,
-        options=request.options,
-        sensor=request.sensor,
-        markers=request.markers,
-    )
-    with signals_to() as signalled:
-        while not signalled and (choice := choose_run(study, opening, RealClock())) is not None:
-            said = _of_the_day(request, study, replace(choice, catalogues=request.catalogues), markers, opening.had)
-            code = "" if choice.training else choice.participant_id
-            opening = replace(opening, named="", options=choice.options, language=choice.language.code)
-            opening = replace(opening, sensor=choice.sensor, markers=choice.markers, participant_id=code, said=said)
-    if signalled:
-        raise KeyboardInterrupt(signalled[0])
-
-
 def check_monitor(monitor: int | None) -> None:
     """`PlaceError` if there is no such screen."""
     known = monitors()
@@ -123,93 +80,6 @@ def _band_and_last(request: RunRequest, last: str) -> tuple[str, str]:
     if request.practice:
         return phrase("PRACTICE – never analysed"), phrase("The practice is over: the run itself comes next.")
     return "", last
-
-
-def _what_is_next(study: StudyFolder, choice: RunRequest) -> str:
-    """What somebody has still to do after a run. `PlaceError`, `JournalError` as of `look_at`."""
-    if choice.training:
-        return THANK_PARTICIPANT
-    person, _ = look_at(study, choice.participant_id)
-    left = [one for one in left_to_do(person, study.experiments) if one != choice.setup.config.experiment]
-    return phrase("Next: {later}.", later=left[0]) if left else THANK_PARTICIPANT
-
-
-def _of_the_day(
-    request: RunRequest, study: StudyFolder, choice: RunRequest, markers: OpenMarkers, had: set[Path]
-) -> str:
-    """Carry out what was chosen; what went wrong, for the start window, which it must not end.
-
-    `had` gains the folder of whoever began.
-    """
-    said, halts = list[str](), threading.Event()
-    with ExitStack() as stack:
-        if choice.training:
-            results = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            choice = replace(choice, results=results, sensor="", markers=False)
-        if choice.markers:
-            beside = markers(choice.results, said.append)
-            while_shown(phrase("Starting the markers …"), lambda: stack.enter_context(beside), halts.set)
-        chosen = replace(choice, seed=request.seed)
-        went_wrong = WITHOUT_MARKERS if said else _carried_out(chosen, study, had, halts=halts.is_set())
-    return "\n".join(filter(None, (*said, went_wrong)))
-
-
-WITHOUT_MARKERS = phrase("The run was not begun: mend that, or untick “{sends_markers}”.", sends_markers=SENDS_MARKERS)
-
-
-def _carried_out(choice: RunRequest, study: StudyFolder, had: set[Path], *, halts: bool) -> str:
-    own = set[Path]() if choice.training else {participant_folder(choice.results, choice.participant_id)}
-    try:
-        run_live(gone_on_with(choice), last=_what_is_next(study, choice), halts=halts)
-        had |= own
-    except RunStopped as stop:
-        had |= own
-        return _stopped(choice, str(stop), halted=stop.halted)
-    except NotAsItBegan as other:
-        return phrase("{refusal}, or press Start and choose “{set_aside}”.", refusal=other.refusal, set_aside=SET_ASIDE)
-    except UnfinishedRun as left:
-        return phrase("{stopped} Start asks whether to go on there or to start anew.", stopped=_text(left))
-    except RecoilError as error:
-        return str(error)
-    return ""
-
-
-def _stopped(choice: RunRequest, reason: str, *, halted: bool) -> str:
-    if choice.training:
-        return phrase("The training stopped: {reason}.", reason=reason)
-    if not halted:
-        return _stopped_at(choice, reason)
-    owed = phrase("Whatever they do next begins with a test shot, and so does the next run on that gun.")
-    if choice.gun == SIMULATED:  # what one person stopped on it is nobody else's
-        owed = phrase("Whatever they do next begins with a test shot.")
-    return f"{_stopped_at(choice, reason)} {owed}"
-
-
-def _stopped_at(choice: RunRequest, reason: str) -> str:
-    if choice.practice:
-        return phrase(
-            "The practice of {participant_id} stopped: {reason}. It can be done again.",
-            participant_id=choice.participant_id,
-            reason=reason,
-        )
-    return phrase(
-        "{participant_id} stopped: {reason}. Start asks whether to go on there or to start anew.",
-        participant_id=choice.participant_id,
-        reason=reason,
-    )
-
-
-def study_of(request: RunRequest) -> StudyFolder:
-    """The study that the config lies in, if the study names it; else this experiment alone, by the rules of that study.
-
-    Where there is no study beside the config, they are those of the shipped one.
-    """
-    own = request.setup.source.parent / "study.toml"
-    config, folder = load_study(str(own) if own.is_file() else "study")
-    setups: tuple[Setup[DesignConfig], ...] = (request.setup,)
-    if request.setup.source.resolve() in [(folder / name).resolve() for name in config.experiments]:
-        setups = tuple(load_setup(folder / name) for name in config.experiments)
-    return StudyFolder(config=config, source=folder / "study.toml", setups=setups, results=request.results)
 
 
 def rooms_px() -> list[tuple[int, int]]:
@@ -277,7 +147,7 @@ class Unfinished(QDialog):
             Option(text=SET_ASIDE, key="Ctrl+N", do=self._fresh),
             Option(text=phrase("Leave it"), key="Esc", do=lambda _: self.reject()),
         )
-        self.question = QuestionBox(_text(found), answers, reason=phrase("to start anew: {why}", why=WHY))
+        self.question = QuestionBox(unfinished_text(found), answers, reason=phrase("to start anew: {why}", why=WHY))
         self.said = TextLines("saved")
         widgets.fill(QVBoxLayout(self), self.question, self.said, margins=None)
         screen = self.screen()
@@ -294,7 +164,8 @@ class Unfinished(QDialog):
         self.accept()
 
 
-def _text(found: UnfinishedRun) -> str:
+def unfinished_text(found: UnfinishedRun) -> str:
+    """How far somebody's run is that is there already, or why that cannot be told."""
     try:
         return people.stopped_text(found.where.participant_id, progress_of(found.where, found.contents))
     except JournalError as error:
