@@ -11,13 +11,14 @@ import sys
 import threading
 from _thread import interrupt_main
 from collections.abc import Sequence
+from contextlib import suppress
 from copy import copy
 from typing import Annotated
 
 import typer
 
 import recoil
-from analysis.report.streams import forgive_streams, keep_results_apart
+from analysis.report.streams import drop_unreadable, forgive_streams, keep_results_apart
 from analysis.report.terminal import INTERRUPTED, UNUSABLE, say
 from device.interrupts import INTERRUPTS
 from device.machine_clock import machine_s
@@ -115,6 +116,8 @@ def main() -> None:
         sys.exit(UNUSABLE)
     finally:
         _leave_signals()
+        if _INTERRUPTED_BY:
+            drop_unreadable()
         gc.freeze()  # what is left goes with the process; looking through it at the end took a sixth of `check`
 
 
@@ -177,7 +180,8 @@ def _interrupt(number: int, _: object) -> None:
     _RAISED_S[0] = now_s
     if not _INTERRUPTED_BY:
         acknowledged = "; what was acknowledged is on the disk" if sys.argv[1:2] == ["run"] else ""
-        say(f"\nrecoil: interrupted{acknowledged}")
+        with suppress(OSError):  # the terminal is gone: nobody reads it, and what was begun is to end in order
+            say(f"\nrecoil: interrupted{acknowledged}")
     _INTERRUPTED_BY.append(number)
     raise KeyboardInterrupt(signal.Signals(number).name)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import pty
 import re
 import select
 import signal
 import subprocess
+import termios
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +23,11 @@ ANSWERS = "fbbffbfb"
 """What the person types, trial after trial, over and over."""
 _ASKED = re.compile(r"[^\n]*\n[^\n]*(?:(?<!entered): |in your own words\. )\Z")
 """What stands last on the screen when somebody is waited for, with the line above it; no half of a line."""
+
+
+def _own_terminal() -> None:
+    """Have the terminal be that of the session, as where a shell was started in it: it hears that it is closed."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
 
 class AtTerminal:
@@ -36,6 +43,7 @@ class AtTerminal:
             stderr=theirs,
             cwd=folder,
             start_new_session=True,
+            preexec_fn=_own_terminal,  # noqa: PLW1509 - it makes one call of the system, and no thread runs yet
         )
         os.close(theirs)
         self._news = threading.Condition()

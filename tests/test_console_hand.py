@@ -101,6 +101,11 @@ def test_what_fires_a_train_does_not_end_it_and_what_pauses_or_halts_it_does(tmp
         ("Key_Left", "", 113, "left"),
         ("Key_Apostrophe", "'", 24, "#39"),  # where Q is on others
         ("Key_unknown", "ф", 38, "A"),
+        ("Key_unknown", "\u0941", 42, "G"),  # a vowel sign of Hindi
+        ("Key_unknown", "\u0e34", 56, "B"),  # of Thai
+        ("Key_Semicolon", ";", 24, "Q"),  # a Greek keyboard
+        ("Key_Slash", "/", 24, "Q"),  # a Hebrew one
+        ("Key_unknown", "€", 26, "#33554431"),
     ],
 )
 def test_a_key_is_a_digit_or_a_letter_by_what_it_types_or_where_it_lies(
@@ -251,11 +256,11 @@ def test_whatever_is_pressed_while_the_key_of_the_test_shot_is_held_calls_it_off
     cell = Cell(tmp_path, display, S.REARMING)
     with cell.reach() as screen:
         fired = len(cell.watch.calls("fired"))
-        for other in ("x", "Tab", "F5", "Delete", "Shift_L", "mouse", "close"):
+        for other in ("x", "Tab", "F5", "Delete", "Shift_L", "mouse", "wheel", "close"):
             screen.keys.key_down("t")
             screen.until(lambda look: look.says("Hold it"))
-            if other == "mouse":
-                with screen.button_down("help", mouse=3):
+            if other in ("mouse", "wheel"):
+                with screen.button_down("help", mouse={"mouse": 3, "wheel": 4}[other]):
                     pass
             elif other == "close":
                 screen.keys.press("F4", "Alt_L")  # by the window manager
@@ -267,6 +272,19 @@ def test_whatever_is_pressed_while_the_key_of_the_test_shot_is_held_calls_it_off
             assert screen.look().state == "rearming"
             assert len(cell.watch.calls("fired")) == fired, other
             time.sleep(0.3)
+
+
+def test_a_key_that_is_tapped_again_and_again_is_not_held(tmp_path: Path, display: str) -> None:
+    cell = Cell(tmp_path, display, S.REARMING)
+    with cell.reach() as screen:
+        fired = len(cell.watch.calls("fired"))
+        for _ in range(14):
+            screen.keys.key_down("t")
+            time.sleep(0.08)
+            screen.keys.key_up("t")
+            time.sleep(0.04)
+        assert screen.look().state == "rearming"
+        assert len(cell.watch.calls("fired")) == fired
 
 
 @needs_psychopy

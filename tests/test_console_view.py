@@ -375,9 +375,33 @@ def test_a_pause_names_the_key_that_starts_a_lost_participants_screen_again() ->
     paused = seen(DIRECTION, Position(states=(State.ASKING, State.PAUSED), step=ask(trial)))
     assert "starts it again" not in instruction(paused).detail
     still = replace(paused, position=replace(paused.position, why="the program stood still"))
-    assert instruction(still).detail.startswith("The program stood still.\nThe gun is disarmed, and nothing goes on. ")
+    assert instruction(still).detail.startswith("The program stood still.\nNothing goes on. ")
     gone = replace(paused, participant=ParticipantSeen(failure="killed by signal 9"))
     assert "Their screen is gone: S starts it again." in instruction(gone).detail
+
+
+@pytest.mark.parametrize(
+    ("asked_s", "state", "now_s", "says"),
+    [
+        (9.9, "armed", 10.5, ""),
+        (10.1, "disarmed", 10.5, "The gun is disarmed."),
+        (10.1, "disarmed", 60.0, "The gun is disarmed."),
+        (10.1, "resetting", 10.5, ""),
+        (10.1, "armed", 11.5, "SWITCH OFF ITS POWER."),
+        (9.9, "disarmed", 11.5, "SWITCH OFF ITS POWER."),
+        (10.1, None, 11.5, "SWITCH OFF ITS POWER."),
+    ],
+)
+def test_a_pause_says_that_the_gun_is_disarmed_where_the_gun_said_so_since(
+    asked_s: float, state: GunState | None, now_s: float, says: str
+) -> None:
+    trial = plan_of(DIRECTION).trials[0]
+    status = None if state is None else status_of(state)
+    paused = Position(states=(State.FIRING, State.PAUSED), step=prepare(trial), since_s=10.0, paused_s=10.0)
+    shown = instruction(seen(DIRECTION, paused, gun=GunSeen(status=status, asked_s=asked_s), now_s=now_s))
+    assert shown.damper.endswith(says)
+    assert bool(shown.damper) is bool(says)
+    assert shown.mood == ("bad" if "POWER" in says else "wait")
 
 
 def test_a_participants_screen_that_is_being_started_again_is_neither_gone_nor_to_be_started() -> None:
@@ -656,7 +680,15 @@ def test_no_time_has_gone_by_before_the_run_begins() -> None:
 @pytest.mark.parametrize(
     ("grain", "typed", "meant"),
     [
-        *((0.1, "7,3", 7.3), (0.5, "7.5", 7.5), (1.0, "10", 10.0), (0.0, "7.123", 7.123), (0.1, " 0 ", 0.0)),
+        *(
+            (0.1, "7,3", 7.3),
+            (0.1, "\uff17\uff0e\uff13", 7.3),
+            (0.1, "\u0667\u066b\u0663", 7.3),
+            (0.5, "7.5", 7.5),
+            (1.0, "10", 10.0),
+            (0.0, "7.123", 7.123),
+            (0.1, " 0 ", 0.0),
+        ),
         (1.0, "2.5", "It goes in steps of 1: type 2 or 3."),
         (0.5, "7.3", "It goes in steps of 0.5: type 7 or 7.5."),
         (0.5, "3.50000001", "It goes in steps of 0.5: type 3.5 or 4."),

@@ -19,7 +19,7 @@ from experiments.design.plan import Plan
 from experiments.design.planning import plan_of
 from experiments.earlier_run import NotAsItBegan, earlier_run, way_back_to_gun
 from experiments.record.journal import Journal, JournalError, read_journal, record_line
-from experiments.record.rebuild import rebuild
+from experiments.record.rebuild import rebuild, rebuild_table
 from experiments.record.replay import go_on, history, replay
 from experiments.run import run
 from experiments.run_request import Again, ParticipantOptions, RunRequest
@@ -177,6 +177,22 @@ def test_a_run_broken_off_within_a_record_goes_on_from_the_last_whole_one(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("more", "says"), [(1, "comes again as a whole"), (2, "if the journal is cut short")])
+def test_a_row_that_a_resumed_run_takes_back_is_no_sign_of_a_cut_journal(
+    more: int, says: str, unbroken: dict[str, Unbroken], tmp_path: Path
+) -> None:
+    whole = unbroken["direction"]
+    journal = broken_off(whole, tmp_path, 2)
+    run(request(whole.name, tmp_path, "resume"), synthetic_screen, VirtualClock())
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:20]))
+    table, data, _ = rebuild(journal)
+    rows, answered = data.splitlines(keepends=True), whole.table.splitlines(keepends=True)
+    lacks = [number for number, line in enumerate(rows) if line != answered[number]][-more:]
+    table.write_bytes(b"".join(answered[number] if number in lacks else line for number, line in enumerate(rows)))
+    (message,) = rebuild_table(journal).messages
+    assert says in message
+
+
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_run_may_be_broken_off_and_gone_on_with_many_times(
     name: str, unbroken: dict[str, Unbroken], tmp_path: Path

@@ -1174,6 +1174,22 @@ def test_a_press_to_call_off_that_comes_behind_the_shot_leaves_what_came_of_it_t
         assert window.pages.currentIndex() == page
 
 
+def test_the_same_key_again_calls_a_test_shot_off_and_begins_no_other_at_once(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shot_check, "RESULT_S", 1e9)
+    window = opened(gun="simulated")
+    key(window, "T", CTRL)
+    until(lambda: window.shots.count.text() != "")
+    key(window, "T", CTRL)
+    until(lambda: not window.shots.is_running)
+    key(window, "T", CTRL)
+    assert not window.shots.is_running
+    assert window.shots.title.text() == "Not fired"
+    key(window, "Escape")
+    assert window.pages.currentIndex() == 0
+
+
 @pytest.mark.parametrize(("apart_s", "taken"), [(0.0, True), (0.3, False)])
 def test_a_repeat_that_a_busy_machine_tells_as_a_new_press_is_none_of_a_key_that_went_down_unseen(
     opened: Open, monkeypatch: pytest.MonkeyPatch, apart_s: float, taken: bool

@@ -276,7 +276,7 @@ def test_a_terminal_that_is_closed_stops_the_run(quick_configs: Path, tmp_path: 
     with AtTerminal(run(quick_configs, "direction"), tmp_path) as screen:
         screen.answer_trials(1)
         screen.hang_up()
-        screen.end()
+        assert screen.end() == 130
     journal = (tmp_path / "results/sub-P01/sub-P01_task-direction_journal.jsonl").read_text()
     assert '"kind":"stopped"' in journal.splitlines()[-1]
 
@@ -332,12 +332,15 @@ HELD, GOES_ON = "\x13", "\x11"
 """Ctrl+S and Ctrl+Q: the terminal shows nothing in between."""
 
 
-def test_what_is_typed_while_the_terminal_shows_nothing_fires_nothing(quick_configs: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", ["x", ""])
+def test_what_is_typed_while_the_terminal_shows_nothing_fires_nothing(
+    first: str, quick_configs: Path, tmp_path: Path
+) -> None:
     with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
         screen.wait_for(DAMPER)
         screen.type("d")
         screen.wait_for(FIRES)
-        screen.type(f"{HELD}x")  # who reads it waits to answer
+        screen.type(f"{HELD}{first}")  # who reads it waits to answer
         screen.type("")
         time.sleep(1.5)  # this is how long it is held
         screen.type(GOES_ON)

@@ -71,6 +71,15 @@ def forgive_streams() -> None:
             stream.reconfigure(errors=errors)
 
 
+def drop_unreadable() -> None:
+    """Forget what is still to be printed on a terminal that is gone: Python would end with a code of its own."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 _results: TextIO | None = None
 
 

@@ -90,14 +90,16 @@ def _holds(path: Path, data: bytes) -> bool:
         return False
 
 
-def _kept(table: Path, data: bytes, messages: list[str]) -> bool:
+def _kept(table: Path, data: bytes, messages: list[str], *, resumed: bool) -> bool:
     """Whether a table has this content already; else it has now, and what stood there is set aside with a message."""
     if _holds(table, data):
         return True
     if os.path.lexists(table):
         beyond = _rows_beyond(table, data)
         aside = storage.set_aside_file(table)
-        messages.append(f"{table}: differed from its journal and was set aside as {aside}{_lost(beyond)}")
+        messages.append(
+            f"{table}: differed from its journal and was set aside as {aside}{_lost(beyond, resumed=resumed)}"
+        )
     storage.write_whole(table, data)
     return False
 
@@ -110,11 +112,13 @@ def _rows_beyond(table: Path, data: bytes) -> int:
         return 0
 
 
-def _lost(rows: int) -> str:
+def _lost(rows: int, *, resumed: bool) -> str:
     """What is said where the table that was set aside holds more than the one that took its place."""
     if not rows:
         return ""
     said = f"it holds more than the journal in {how_many(rows, 'row')}, which the table made now lacks"
+    if rows == 1 and resumed:
+        return f"; {said}: a trial that was broken off comes again as a whole, and what it had is in the journal"
     return f"; {said}: if the journal is cut short, put it back whole, and the table that was set aside in its place"
 
 
@@ -125,8 +129,9 @@ def rebuild_table(path: Path) -> RebuiltTable:
     """
     table, data, contents = rebuild(path)
     messages = [contents.cut_message] if contents.cut_message else []
-    kept = _kept(table, data, messages)
+    resumed = any(record.kind == "resumed" for record in contents.records)
+    kept = _kept(table, data, messages, resumed=resumed)
     measured = shots_table(contents)
     if measured is not None:
-        _kept(shots_path(path), measured, messages)
+        _kept(shots_path(path), measured, messages, resumed=resumed)
     return RebuiltTable(table=table, rebuilt=not kept, messages=tuple(messages))

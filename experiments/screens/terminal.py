@@ -56,6 +56,9 @@ _STOPS = ("!", "\uff01")
 _HELD_S = 0.3
 """Who writes for longer waits for the terminal, which Ctrl+S holds: nobody sees, or is heard (assumed)."""
 
+_UNSEEN = "\r"
+"""Changes nothing behind the Enter of a line."""
+
 
 class TerminalScreen:
     """Says on a terminal what to do, and offers what is typed."""
@@ -208,6 +211,7 @@ class TerminalScreen:
         with self._lock:
             position = self._shown
         now_s = self._clock.now()
+        self._show(_UNSEEN if self._out.isatty() else "")  # where Ctrl+S holds the terminal, a line waits here
         event = self._meant(line, position, now_s)
         if isinstance(event, str):
             self._say(f"  {event}")

@@ -349,11 +349,16 @@ def doubt_text(doubt: CodeDoubt) -> str:
     )
 
 
+_POINTS = str.maketrans("\uff0e\uff0c\u066b\u066c", ".,,,")
+"""Points and commas of other alphabets: those as wide as a Chinese letter, and the Arabic ones."""
+
+
 def typed_rating(text: str, scale: Rate) -> float | str:
     """A number as people type it, comma or point, if it lies on the scale; else what to say.
 
     Nothing is rounded: what is kept is what was said.
     """
+    text = text.translate(_POINTS)
     try:
         number = float("nan" if "_" in text else text.strip().replace(",", "."))
     except ValueError:

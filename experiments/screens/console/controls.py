@@ -451,4 +451,4 @@ class Controls:
         does = keys.BY_NAME[name].does
         if name in keys.ANSWERS:
             does = phrase("enters {label}", label=self.choices[keys.ANSWERS.index(name)].told)
-        return f"{key:<8} {does}" + (phrase("   – not now: {because}", because=not_now) if not_now else "")
+        return f"{key:<15} {does}" + (phrase("   – not now: {because}", because=not_now) if not_now else "")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from experiments.live_run import HALT_UNSAVED
 from experiments.screens import texts
 from experiments.screens.console.keys import is_on_buttons
-from experiments.screens.console.view import Ended, Seen, has_a_page, method_text
+from experiments.screens.console.view import UNANSWERED_S, Ended, Seen, has_a_page, method_text
 from experiments.screens.phrases import isolated, phrase
 from experiments.screens.practice_text import practice_text, round_before_text
 from experiments.session.history import counting, entered_value
@@ -18,6 +18,7 @@ from experiments.session.steps import Answered, Ask, Asking, Describe, Inform, P
 
 DISARMING = phrase("Disarming. If the gun does not fall silent: SWITCH OFF ITS POWER.")
 """What is shown from a stop until the gun has answered."""
+NOT_DISARMED = phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,13 +245,26 @@ def _paused(seen: Seen) -> Instruction:
         )
         detail = f"{_sentence(seen.position.why)}\n{again}"
     else:
-        detail = phrase("The gun is disarmed, and nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
+        detail = phrase("Nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
         if seen.position.why:
             detail = f"{_sentence(seen.position.why)}\n{detail}"
         if seen.participant_gone:
             gone = phrase("Their screen is gone: {restart_key} starts it again.", restart_key=seen.key("restart"))
             detail = f"{detail}\n{gone}"
-    return Instruction(title=phrase("Paused"), detail=detail, mood="wait")
+    gun, mood = _since_pause(seen)
+    return Instruction(title=phrase("Paused"), damper=gun, detail=detail, mood=mood)
+
+
+def _since_pause(seen: Seen) -> tuple[str, str]:
+    """What the gun said since the pause, and a word that chooses the colour; a gun that answers does so at once."""
+    paused_s = seen.position.since_s if seen.position.paused_s is None else seen.position.paused_s
+    match _says_disarmed(seen, paused_s):
+        case True:
+            return phrase("The gun is disarmed."), "wait"
+        case _ if seen.now_s - paused_s <= UNANSWERED_S:
+            return "", "wait"
+        case _:
+            return NOT_DISARMED, "bad"
 
 
 def _correcting(seen: Seen) -> Instruction:
@@ -297,12 +311,21 @@ def _halted(seen: Seen) -> Instruction:
 
 def _since_halt(seen: Seen) -> str:
     """What the gun said since the emergency stop: what it said before says nothing of now."""
+    match _says_disarmed(seen, seen.position.since_s):
+        case None:
+            return DISARMING
+        case True:
+            return phrase("The gun itself says that it is disarmed.")
+        case _:
+            return NOT_DISARMED
+
+
+def _says_disarmed(seen: Seen, since_s: float) -> bool | None:
+    """Whether the gun says that it is disarmed; `None` if it was not asked since then."""
     gun = seen.gun
-    if gun is None or gun.asked_s < seen.position.since_s:
-        return DISARMING
-    if gun.status is not None and gun.status.state == "disarmed":
-        return phrase("The gun itself says that it is disarmed.")
-    return phrase("The gun does not say that it is disarmed: SWITCH OFF ITS POWER.")
+    if gun is None or gun.asked_s < since_s:
+        return None
+    return gun.status is not None and gun.status.state == "disarmed"
 
 
 def _closing(seen: Seen) -> Instruction:

@@ -86,7 +86,7 @@ class AnyHeld(_OverAll):
 
 
 class WhateverPressed(_OverAll):
-    """Has any press act, of all keys but one, and of the mouse as well if so asked; each goes on to its place.
+    """Has any press act, of all keys but one, and of the mouse and its wheel if so asked; each goes on to its place.
 
     Of what is a shortcut Qt tells no press, but that it is about to look for it.
     """
@@ -103,7 +103,7 @@ class WhateverPressed(_OverAll):
             beside = "Ctrl+" if event.modifiers() & QtCore.Qt.KeyboardModifier.ControlModifier else ""
             acts = went_down and f"{beside}{key_name(event)}" != self._but
         else:
-            acts = self._mouse and event.type() == QtCore.QEvent.Type.MouseButtonPress
+            acts = self._mouse and event.type() in (QtCore.QEvent.Type.MouseButtonPress, QtCore.QEvent.Type.Wheel)
         if acts:
             self._act()
         return False

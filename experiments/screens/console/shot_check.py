@@ -191,7 +191,7 @@ class ShotPage(QWidget):
         self._keeper = DebtKeeper(results, self.unkept.emit)
         self._debt: OwedShot | None = None
         self._method_at = 0
-        self._calls_off, self._fired_s = False, -math.inf
+        self._calls_off, self._fired_s, self._over_s = False, -math.inf, -math.inf
         self.over: Callable[[], None] = lambda: None
         self._gun_name = self._unkept = self._why = ""
         self._shown_detail = ("", "wait")
@@ -212,7 +212,7 @@ class ShotPage(QWidget):
         self.call_off_button = widgets.button(self, phrase("Call it off"), "Esc", self._escape, clicked=self._clicked)
         self.call_off_button.went_down.connect(self._call_off_at_once)
         self.call_off_button.stops = True
-        self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin)
+        self.next_button = widgets.button(self, phrase("Next test shot"), "Ctrl+T", self.begin, unseen=self.call_off)
         self.stop_button = widgets.button(
             self, phrase("EMERGENCY STOP"), "F12", self.emergency_stop, name="stop", at_once=True
         )
@@ -261,8 +261,10 @@ class ShotPage(QWidget):
         return methods[self._method_at % len(methods)]
 
     def begin(self) -> None:
-        """Test the next method."""
-        if self._check is not None or self._setup is None or self.stopped or self._is_to_be_read:
+        """Test the next method; not at once behind another shot, or behind one that a hand just called off."""
+        if self._check is not None or self._setup is None or self.stopped:
+            return
+        if self._clock.now() - self._over_s < RESULT_S:
             return
         method = self._next_method(self._setup)
         self._shown = self.next_text().removeprefix(phrase("Test shot: "))
@@ -376,7 +378,7 @@ class ShotPage(QWidget):
     def _end(self, told: ShotProgress) -> None:
         if self._check is not None:
             self._gun_name = self._check.gun_name
-        self._check, why, self._why = None, self._why, ""
+        self._check, why, self._why, self._over_s = None, self._why, "", self._clock.now()
         if told.fired:
             self._method_at += 1
             self.owed, self._fired_s = self.stopped, self._clock.now()

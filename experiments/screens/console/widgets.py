@@ -150,11 +150,12 @@ def button(
     name: str = "",
     at_once: bool = False,
     clicked: Slot | None = None,
+    unseen: Slot = lambda: None,
 ) -> ConsoleButton:
     """A button that shows its key, and the key. Both do the same, and only while the button is there to be seen.
 
     `at_once`: what stops acts as the button goes down, the others as it is let go. `clicked` is what that does where it
-    is not what the key does.
+    is not what the key does; `unseen` what the key does while the button is not there.
     """
     made = ConsoleButton(f"{text}  [{key.replace('Return', 'Enter')}]")
     made.setObjectName(name)
@@ -167,8 +168,7 @@ def button(
         made.clicked.connect(lambda _: (clicked or slot)())
 
     def pressed() -> None:
-        if made.isVisible():
-            slot()
+        (slot if made.isVisible() else unseen)()
 
     shortcut = QtGui.QShortcut(QtGui.QKeySequence(key), parent)
     shortcut.setAutoRepeat(False)

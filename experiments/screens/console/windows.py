@@ -12,6 +12,7 @@ import re
 import signal
 import sys
 import traceback
+import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -316,6 +317,7 @@ class Keyboard(QtCore.QObject):
             return self._hears.is_elsewhere(key) or self._is_stale_text(key, fresh=acts)
         self._into.pop(key, None)
         if acts:
+            self._hears.up(key)  # a hand let it go just now, for however short a time
             self._hears.down(name, at_s)
         return True
 
@@ -364,7 +366,7 @@ class FreshShortcuts(QtCore.QObject):
 
     def _act_by_place(self, event: QKeyEvent, key: str) -> bool:
         """Activate the shortcut of a key whose alphabet has no such letter: Qt, which looks for letters, finds none."""
-        if event.key() < _ASCII_END or key not in _PLACES.values():
+        if key not in _PLACES.values() or event.key() == ord(key):
             return False
         wanted = QtGui.QKeySequence(QtCore.QKeyCombination(event.modifiers(), QtCore.Qt.Key(ord(key))))
         there = [one for one in self._widget.findChildren(QtGui.QShortcut) if one.key() == wanted and _is_active(one)]
@@ -410,5 +412,14 @@ def key_name(event: QKeyEvent) -> str:
         return named
     if key < _ASCII_END and chr(key).isalnum():  # Qt's numbers of letters and digits are those of ASCII
         return chr(key)
-    is_letter = event.text().isalpha() and not event.text().isascii()
+    is_letter = _is_of_other_alphabet(event.text()) or (place == _Q_PLACE and event.text() in _ON_Q)
     return _DIGITS.get(place) or (_PLACES.get(place) if is_letter else None) or f"#{key}"
+
+
+_Q_PLACE, _ON_Q = 24, (";", "/")
+"""The place of Q, and what Greek and Hebrew keyboards have there, which no Latin one has."""
+
+
+def _is_of_other_alphabet(text: str) -> bool:
+    """Whether a key gives a letter, or a sign on one as a vowel is in Thai and Hindi, that is none of ours."""
+    return bool(text) and not text.isascii() and all(unicodedata.category(one)[0] in "LM" for one in text)
