@@ -375,7 +375,7 @@ def test_a_pause_names_the_key_that_starts_a_lost_participants_screen_again() ->
     paused = seen(DIRECTION, Position(states=(State.ASKING, State.PAUSED), step=ask(trial)))
     assert "starts it again" not in instruction(paused).detail
     still = replace(paused, position=replace(paused.position, why="the program stood still"))
-    assert instruction(still).detail.startswith("The program stood still.\nNothing goes on. ")
+    assert instruction(still).detail.startswith("The program stood still.\nNothing happens meanwhile. ")
     gone = replace(paused, participant=ParticipantSeen(failure="killed by signal 9"))
     assert "Their screen is gone: S starts it again." in instruction(gone).detail
 

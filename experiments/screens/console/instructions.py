@@ -245,7 +245,7 @@ def _paused(seen: Seen) -> Instruction:
         )
         detail = f"{_sentence(seen.position.why)}\n{again}"
     else:
-        detail = phrase("Nothing goes on. {go_on_key} goes on.", go_on_key=seen.key("go on"))
+        detail = phrase("Nothing happens meanwhile. {go_on_key} goes on.", go_on_key=seen.key("go on"))
         if seen.position.why:
             detail = f"{_sentence(seen.position.why)}\n{detail}"
         if seen.participant_gone:
