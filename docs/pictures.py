@@ -123,6 +123,7 @@ def _start(screen: AtDisplay, eye: Path) -> None:
     screen.keys.press("t", "Control_L")
     _shown(screen, eye, "STAND CLEAR", "test-shot")
     _shown(screen, eye, "Fired", "")
+    time.sleep(1.0)  # what came of it is to be read first: no key leaves it at once
     screen.keys.press("Escape")
     _shown(screen, eye, "Next: P02", "")
     for key in ("P", "0", "2"):
