@@ -329,14 +329,14 @@ def main(named: list[str]) -> int:
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         _stand_in(Path(folder))
-        todo = [Path(name).resolve() for name in named] or sorted(pages(), key=_work, reverse=True)
+        chosen = [Path(name).resolve() for name in named] or sorted(pages(), key=_work, reverse=True)
         with multiprocessing.get_context("fork").Pool(maxtasksperchild=1) as pool:
-            for page, took_s, why in pool.imap_unordered(_timed, todo, chunksize=1):
+            for page, took_s, why in pool.imap_unordered(_timed, chosen, chunksize=1):
                 failed += why is not None
                 print(f"{page.relative_to(ROOT)}: {f'{took_s:.1f} s' if why is None else 'FAILED'}", flush=True)
                 if why is not None:
                     print(why, file=sys.stderr, flush=True)
-    print(f"{len(todo)} pages, {failed} failed")
+    print(f"{len(chosen)} pages, {failed} failed")
     return int(failed > 0)
 
 

@@ -141,7 +141,7 @@ def _is_journal(path: str) -> bool:
 def _is_counted(path: str) -> bool:
     """Whether a file may hold data: a practice holds none, nor does a register."""
     name = _name(path)
-    return not is_practice(name) and (not name.endswith(_JOURNALS) or _is_journal(name))
+    return not is_practice(name) and (not name.lower().endswith(_JOURNALS) or _is_journal(name.lower()))
 
 
 def _real(path: Path) -> str:

@@ -30,7 +30,7 @@ REGISTER_FILE = "participants.jsonl"
 MAX_REASON = 200
 _DAMAGED = "the register was changed or damaged: restore it from a copy, or rename it and enter the participants anew"
 _PATIENCE_S = 5.0
-"""How often, and how long apart, a register that another console holds is tried: it is held for one record only."""
+"""So long a register that another console holds is waited for: it is held for one record only."""
 
 
 class RegisterError(JournalError):
