@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from device.parameters import DriveOff, Emf
 from device.physics import GunParameters, simulate
-from device.physics.equations import CONTINUES, pack
+from device.physics.equations import CONTINUES, ShotResult, ShotState, StepSeries, pack
+from device.physics.shot import shoot as shoot_into
 from device.physics.traces import segments
 
 EXTREMES = {
@@ -51,6 +52,13 @@ SPREAD = {
 }
 HALVINGS = 20
 NOISE = 2e-11  # relative: below it differences are rounding and tolerance, not the gun's
+
+
+def work(gun):
+    """How the shot ended, and the work that it took, which does not depend on the machine."""
+    series, result = StepSeries(), ShotResult()
+    shoot_into(pack(gun), ShotState(), series, result)
+    return result.status, series.work
 
 
 def order_of(gun):

@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 
 from device.physics import GunParameters, coil, segments, shot, simulate
-from device.physics.equations import DRIVE_CHANGE, FREE, HOME, NOT_HOME, TURN, ShotResult, ShotState, StepSeries, pack
+from device.physics.equations import DRIVE_CHANGE, FREE, HOME, NOT_HOME, TURN, ShotState, StepSeries, pack
 from device.physics.traces import energy_balance
+from tests.extreme_guns import work
 
 SHOTS = json.loads((Path(__file__).parent / "golden" / "physics_far.json").read_text(encoding="utf-8"))["shots"]
-
+CREEPING = SHOTS[:3]
+"""The fourth sticks and slips."""
 
 RINGING = {
     "printed": GunParameters(
@@ -65,23 +67,18 @@ HELD = GunParameters(
 )
 
 
-def work(gun):
-    """How the shot ended, and the work that it took, which does not depend on the machine."""
-    series, result = StepSeries(), ShotResult()
-    shot.shoot(pack(gun), ShotState(), series, result)
-    return result.status, series.work
-
-
 @pytest.mark.parametrize("row", SHOTS, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
-def test_a_creeping_magnet_agrees_with_fifty_digits(row):
-    found = simulate(GunParameters(**row["gun"]))
+def test_it_agrees_with_fifty_digits(row):
+    gun = GunParameters(**row["gun"])
+    found, least = simulate(gun), 1e-15 * gun.stiffness_N_m * gun.preload_length_m  # of what cancels in a force
     assert found.status == "home"
     for name, digits in row["summary"].items():
-        assert getattr(found, name) == pytest.approx(float(digits), rel=1e-12, abs=0.0), name
+        cancels = least if name == "peak_force_N" else 0.0
+        assert getattr(found, name) == pytest.approx(float(digits), rel=1e-12, abs=cancels), name
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", SHOTS, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
+@pytest.mark.parametrize("row", CREEPING, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
 @pytest.mark.parametrize("name", ["magnet_mass_kg", "inductance_H"])
 def test_the_work_does_not_grow_with_the_stiffness(row, name):
     gun = GunParameters(**row["gun"])

@@ -103,6 +103,8 @@ _SELDOM = frozenset(
         "rest",
         "roots_of",
         "shoot_side_by_side",
+        "slip",
+        "slip_on",
         "to_coil",
     ]
 )

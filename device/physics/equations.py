@@ -111,6 +111,7 @@ class ShotState:
     creeping_from: float = 0.0  # when to look next whether they do
     farthest: float = FARTHEST  # a trace, in which nothing may jump, has less
     until: float = HORIZON_S
+    slips: int = 0  # how often the magnet has broken away since the slips ahead were last looked at
 
 
 def _zeros() -> list[float]:
@@ -127,6 +128,9 @@ class StepSeries:
     other: list[float] = field(default_factory=_zeros)  # whose roots are looked for
     bernstein: list[float] = field(default_factory=_zeros)
     beyond: list[float] = field(default_factory=_zeros)  # the other half of an interval
+    shares: list[float] = field(default_factory=_zeros)  # of the way left, by slips, in Chebyshev's polynomials
+    waits: list[float] = field(default_factory=_zeros)  # from each slip to the next, in the same way
+    limit: float = 0.0  # where slips lead to
     work: int = 0  # how often a series was made, or turned into another basis
 
 

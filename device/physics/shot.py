@@ -58,6 +58,7 @@ from device.physics.polynomial import (
     value_at,
 )
 from device.physics.segments import advance, enter, pulse_off, pulse_on
+from device.physics.slips import slip_on
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -91,13 +92,15 @@ def shoot_on(p: Constants, s: ShotState, w: StepSeries, out: ShotResult) -> None
             break
         if w.work > MAX_WORK or not goes_on(p, s, event):
             break
+        if event == BREAK_AWAY:
+            slip_on(p, s, w, out)
     conclude(p, s, event, out)
 
 
 def begin(p: Constants, s: ShotState, out: ShotResult) -> None:
     """The first segment of a shot."""
     forget(out)
-    out.max_displacement_m, s.heading = s.x, 0.0
+    out.max_displacement_m, s.heading, s.slips = s.x, 0.0, 0
     pulse_on(p, s)
     enter(p, s, BREAK_AWAY)
 
