@@ -2,7 +2,7 @@
 
 With the folder of an older version in `RECOIL_OLD` (`git worktree add --detach FOLDER COMMIT`, then `make full` there)
 both are run in turn, and the table has their ratio; else it has new times alone. A bound is a time for a machine on
-which 64dce29 takes a known one as it was set up, with nothing of Python compiled, which setting up does by now. So it is
+which 64dce29 takes a known one as it was set up, with nothing of Python compiled, as setting up does by now. So it is
 held as a share of that. Beside it stands what the old one takes with all of Python compiled before.
 """
 
