@@ -2,8 +2,10 @@
 
 import dataclasses
 import math
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import pytest
 from device.messages import RecoilError
 from device.physics import FIDELITIES, GunParameters, ShotBatch, batch, compiled_simulator, simulate, simulate_batch
 
+ROOT = Path(__file__).parent.parent
 NUMBERS = [field.name for field in dataclasses.fields(ShotBatch) if field.name != "status"]
 
 
@@ -136,6 +139,61 @@ def test_what_one_process_compiled_is_found_by_the_next():
     code = "import sys; from device.physics.batch import machine_code; sys.stdout.write(machine_code().__qualname__)"
     names = {subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout for _ in range(2)}
     assert len(names) == 1
+
+
+KEPT = """
+import resource, sys, numpy as np
+from device.physics.batch import call, compiled
+def twice(numbers):
+    for n in range(len(numbers)):
+        numbers[n] *= 2.0
+numbers = np.ones(3)
+if "full" in sys.argv:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+call(compiled(twice), numbers)
+sys.stdout.write(f"{numbers.sum():g}")
+"""
+"""What the compiler keeps has a file of its own: it keeps nothing of what was typed."""
+
+
+@pytest.fixture
+def twice(tmp_path):
+    """A process that has a function compiled, and calls it once; the folder of what the compiler keeps."""
+    pytest.importorskip("numba")
+    file, kept = tmp_path / "kept.py", tmp_path / "cache"
+    file.write_text(KEPT, encoding="utf-8")
+    kept.mkdir()
+
+    def run(*words):
+        variables = os.environ | {"NUMBA_CACHE_DIR": str(kept), "PYTHONPATH": str(ROOT)}
+        return subprocess.run(
+            [sys.executable, file, *words], capture_output=True, text=True, check=False, env=variables
+        )
+
+    return run, kept
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("size", [0, 40])
+def test_what_is_damaged_in_the_compilers_cache_is_made_anew(twice, ending, size):
+    run, kept = twice
+    assert run().stdout == "6"
+    (file,) = kept.rglob(f"*.{ending}")
+    whole = file.read_bytes()
+    file.write_bytes(whole[:size])
+    done = run()
+    assert (done.returncode, done.stdout) == (0, "6"), done.stderr
+    (file,) = kept.rglob(f"*.{ending}")
+    assert len(file.read_bytes()) == len(whole)
+
+
+@pytest.mark.slow
+def test_a_compilers_cache_without_room_stands_in_no_way(twice):
+    run, kept = twice
+    done = run("full")
+    assert (done.returncode, done.stdout) == (0, "6"), done.stderr
+    assert not [*kept.rglob("*.nbc")]
 
 
 @pytest.mark.slow

@@ -4,7 +4,9 @@ import math
 
 import pytest
 
-from device.physics import GunParameters, simulate
+from device.physics import GunParameters, simulate, trace
+from device.physics.equations import HORIZON_S
+from device.physics.traces import energy_balance
 from tests.extreme_guns import BREAK_AWAY_V, numbers, shoot
 from tests.shot_trains import repeated
 
@@ -99,3 +101,39 @@ def test_re_firing_from_one_to_a_hundred_hertz(rate_Hz, drive_off, friction_N):
         assert all(math.isfinite(value) for value in numbers(shot.summary).values())
         assert shot.summary.status in ("home", "not-home", "stuck", "no-break-away")
         assert shot.start.displacement_m >= 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mass_kg", "resistance_ohm"), [(1e-6, 0.03), (1e-9, 2.9)])
+def test_a_trace_that_is_more_work_than_its_summary_ends_where_it_is_given_up(mass_kg, resistance_ohm):
+    """It follows the ring of a light magnet, which the summary leaves early, or each of its slips."""
+    gun = GunParameters(magnet_mass_kg=mass_kg, resistance_ohm=resistance_ohm)
+    shot, balance = trace(gun), energy_balance(gun)
+    assert shot.summary.status == "home"
+    assert shot.given_up_s == balance.given_up_s == shot.time_s[-1] < shot.summary.reset_end_s
+    assert (shot.displacement_m >= 0.0).all()
+    assert shot.displacement_m.max() <= shot.summary.max_displacement_m * (1.0 + 1e-9)
+    assert abs(shot.force_N).max() < 1.1 * shot.summary.peak_force_N
+    assert abs(balance.residual_J) < 1e-12 * balance.supplied_J
+
+
+@pytest.mark.parametrize("gun", [GunParameters(), GunParameters(pulse_s=100.0), GunParameters(friction_N=1.7)])
+def test_a_shot_that_comes_to_rest_or_takes_all_its_time_is_not_given_up(gun):
+    shot = trace(gun)
+    assert shot.given_up_s is energy_balance(gun).given_up_s is None
+    assert shot.time_s[-1] <= HORIZON_S
+
+
+@pytest.mark.parametrize("number", [5e-324, 1e-310, 1e300])
+@pytest.mark.parametrize(
+    "name", ["magnet_mass_kg", "resistance_ohm", "inductance_H", "coil_reach_m", "stiffness_N_m", "voltage_V"]
+)
+def test_the_course_of_a_shot_beyond_floats_is_refused_in_words_or_in_floats(name, number):
+    gun = GunParameters(**{name: number})
+    simulate(gun)
+    for look, sum_of in ((trace, lambda shot: shot.time_s.sum()), (energy_balance, lambda found: found.residual_J)):
+        try:
+            said = math.isfinite(sum_of(look(gun)))
+        except ValueError as error:
+            said = "beyond what numbers can express" in str(error)
+        assert said

@@ -123,7 +123,7 @@ def test_a_figure_needs_a_name(recoil, tmp_path, name, said):
     assert list(tmp_path.rglob("*.*")) == []
 
 
-@pytest.mark.parametrize("change", ["voltage_V=1e308", "magnet_mass_kg=1e-300"])
+@pytest.mark.parametrize("change", ["voltage_V=1e308", "voltage_V=1e300"])
 def test_a_shot_beyond_any_axis_is_not_drawn(recoil, tmp_path, change):
     done = recoil("simulate", "--set", change, "--plot", tmp_path / "shot.png")
     assert (done.returncode, "no axis holds" in done.stderr) == (2, True)
@@ -161,3 +161,27 @@ def test_a_figure_of_another_kind_is_refused_with_those_there_are(recoil, tmp_pa
     said = f"--plot {tmp_path}/shot{ending}: figures are PNG, SVG and PDF; name one of these, as in shot.png"
     assert (done.returncode, said in done.stderr) == (2, True)
     assert not [*tmp_path.glob("shot*")]
+
+
+def test_a_course_that_is_given_up_before_the_shot_is_over_says_where(recoil, tmp_path):
+    trace, figure, asked = tmp_path / "light.csv", tmp_path / "light.png", {figure_files.ASKED: "1"}
+    change = ("--set", "magnet_mass_kg=1e-6", "--set", "resistance_ohm=0.03")
+    done = recoil("simulate", *change, "--audit", "--trace", trace, "--plot", figure, **asked)
+    assert done.returncode == 0, done.stderr
+    end_s = float(trace.read_text(encoding="utf-8").splitlines()[-1].partition(",")[0])
+    up_to = f"up to {end_s:.4g} s, where it is more work than is done for a shot"
+    assert f"Energy and momentum, full model, {up_to}" in done.stdout
+    assert f"--trace and --plot: {up_to}; the numbers are of the whole shot" in done.stderr
+    assert "status                   home" in done.stdout
+    assert f"followed to {end_s:.4g} s" in figure.with_suffix(".svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("option", "number"),
+    [("--audit", "voltage_V=1e300"), ("--trace", "inductance_H=1e-310"), ("--plot", "inductance_H=1e-310")],
+)
+def test_the_course_of_a_shot_beyond_floats_is_refused(recoil, tmp_path, option, number):
+    words = [option] if option == "--audit" else [option, str(tmp_path / "shot.png")]
+    done = recoil("simulate", "--set", number, *words)
+    assert done.returncode == 2
+    assert f"{option}: this shot goes beyond what numbers can express; leave {option} out" in done.stderr

@@ -7,6 +7,7 @@ processes load it in about a second. No session calls this.
 from __future__ import annotations
 
 import hashlib
+import pickle
 import struct
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -126,11 +127,34 @@ def no_compiler() -> str:
     return ""
 
 
+@lru_cache(maxsize=1)
 def machine_code() -> MachineCode:
     """The shots of many guns in machine code. `RecoilError`: there is no compiler."""
     from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler
 
-    return compiled(cast("FunctionType", shoot_each))
+    code = compiled(cast("FunctionType", shoot_each))
+    call(code, np.empty(0, _GUN), np.empty(0, _RESULT), np.empty(0, np.bool_), *_room())
+    return code
+
+
+def call(code: MachineCode, *arguments: Any) -> None:
+    """A call of machine code, which may be the first: it is taken from the compiler's cache, or made and put there.
+
+    No cache stands in the way: what is damaged in it (a computer that lost its power) is deleted and made anew, and
+    what does not go into it (a full disk) is made anew by the next process.
+    """
+    try:
+        code(*arguments)
+    except OSError:  # it is made, and only not kept
+        code(*arguments)
+    except (pickle.PickleError, EOFError, ValueError, TypeError, AttributeError, ImportError, LookupError):
+        stats, name = code.stats, code.__qualname__  # type: ignore[attr-defined] # what the compiler adds
+        kept = [*Path(stats.cache_path).glob(f"*.{name}-*")]
+        if not kept:
+            raise
+        for path in kept:
+            path.unlink(missing_ok=True)
+        code(*arguments)
 
 
 @lru_cache(maxsize=4)

@@ -9,7 +9,8 @@ while the force fades, and makes or swallows energy. The impulse on the hand ove
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -22,6 +23,8 @@ from device.physics.equations import (
     BREAK_AWAY,
     COIL,
     FREE,
+    GIVEN_UP,
+    HORIZON_S,
     MAX_SEGMENTS,
     MAX_WORK,
     SETTLED,
@@ -53,6 +56,7 @@ _DENSE_S = 0.015  # where the current and the force change fast: pulse and recoi
 FARTHEST_IN_TRACE = 1e-11
 """How far speed may jump where a ring is left, as a share: what is felt or drawn shows a jump."""
 _REST_AFTER_S = 0.010  # shown after the last motion
+_NO_FLOATS = "this shot goes beyond what numbers can express"
 
 
 class CoilSeries(NamedTuple):
@@ -108,17 +112,36 @@ class Segment:
 
 
 def segments(constants: Constants) -> Iterator[Segment]:
-    """The segments of one shot from rest, in order; the last one is settled for good, or given up."""
+    """The segments of one shot from rest, in order. The last one is settled for good, or where the shot's time ended.
+
+    Or where it was given up: as too much work, or beyond floats.
+    """
+    try:
+        yield from _followed(constants)
+    except (ArithmeticError, ValueError):  # as in `device.physics.shot.interpret`
+        return
+
+
+def _followed(constants: Constants) -> Iterator[Segment]:
     s, w = ShotState(farthest=FARTHEST_IN_TRACE), StepSeries()
     pulse_on(constants, s)
     enter(constants, s, BREAK_AWAY)
     for _ in range(MAX_SEGMENTS):
         began = s.kind, s.heading, s.u, s.live, s.time, (s.x, s.v, s.i)
         event = advance(constants, s, w)
+        if event == GIVEN_UP or not math.isfinite(s.x + s.v + s.i):
+            return
         yield _segment(constants, began, s, w, event)
         w.work += 1
         if w.work > MAX_WORK or not goes_on(constants, s, event):
             return
+
+
+def given_up_s(shot: Sequence[Segment]) -> float | None:
+    """When a shot was given up that was neither at rest nor followed to the end of its time; None if it was not."""
+    if not shot:
+        return 0.0
+    return None if shot[-1].ended_by == SETTLED or shot[-1].end_s >= HORIZON_S else shot[-1].end_s
 
 
 _Began = tuple[int, float, float, bool, float, tuple[float, float, float]]
@@ -146,7 +169,10 @@ def _segment(constants: Constants, began: _Began, s: ShotState, w: StepSeries, e
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShotTrace:
-    """One shot over time, arrays of one length, and its summary. `force_N` is F, without the collision."""
+    """One shot over time, arrays of one length, and its summary. `force_N` is F, without the collision.
+
+    A trace follows each ring and slip, so it may be given up where the summary is not; it ends there.
+    """
 
     time_s: NDArray[np.float64]
     displacement_m: NDArray[np.float64]
@@ -156,17 +182,25 @@ class ShotTrace:
     force_N: NDArray[np.float64]
     drive_V: NDArray[np.float64]
     summary: ShotSummary
+    given_up_s: float | None
 
 
 def trace(parameters: GunParameters, points: int = 2000) -> ShotTrace:
-    """One shot from rest over time, half of the points in its first 15 ms. `ValueError`: fewer than 2 points."""
+    """One shot from rest over time, half of the points in its first 15 ms.
+
+    `ValueError`: fewer than 2 points, or numbers beyond floats.
+    """
     if points < 2:
         raise ValueError(f"points is {points}; it must be at least 2")
     shot = list(segments(pack(parameters)))
+    if not shot:
+        raise ValueError(_NO_FLOATS)
     times = _grid(parameters, shot, points)
     places = np.searchsorted([segment.start_s for segment in shot], times, side="right") - 1
-    rows = [_row(shot[place], t) for place, t in zip(places.tolist(), times.tolist(), strict=True)]
-    x, v, i, motor, force, drive = np.array(rows).T
+    rows = np.array([_row(shot[place], t) for place, t in zip(places.tolist(), times.tolist(), strict=True)])
+    if not np.isfinite(rows).all():
+        raise ValueError(_NO_FLOATS)
+    x, v, i, motor, force, drive = rows.T
     return ShotTrace(
         time_s=times,
         displacement_m=x,
@@ -176,13 +210,13 @@ def trace(parameters: GunParameters, points: int = 2000) -> ShotTrace:
         force_N=force,
         drive_V=drive,
         summary=simulate(parameters),
+        given_up_s=given_up_s(shot),
     )
 
 
 def _grid(gun: GunParameters, shot: list[Segment], points: int) -> NDArray[np.float64]:
-    settled = shot[-1].ended_by == SETTLED
-    last = shot[-1].start_s if settled else shot[-1].end_s
-    end_s = (max(last, gun.pulse_s) if not settled or last < gun.pulse_s else last) + _REST_AFTER_S
+    last = shot[-1]
+    end_s = max(last.start_s, gun.pulse_s) + _REST_AFTER_S if last.ended_by == SETTLED else last.end_s
     dense_s = min(_DENSE_S, end_s / 2)
     dense = np.linspace(0.0, dense_s, points // 2, endpoint=False)
     return np.concatenate([dense, np.linspace(dense_s, end_s, points - points // 2)])
@@ -215,11 +249,20 @@ class EnergyBalance:
     force_impulse_Ns: float  # integral of F on the hand
     collision_impulse_Ns: float  # of the impacts on the stop, of the other sign
     residual_impulse_Ns: float  # both, and the momentum that is left
+    given_up_s: float | None  # None: until the magnet rests, or for 10 s
 
 
 def energy_balance(gun: GunParameters) -> EnergyBalance:
-    """The energies and impulses of one shot from rest."""
+    """The energies and impulses of one shot from rest. `ValueError`: numbers beyond floats."""
     shot = list(segments(pack(gun)))
+    with suppress(ArithmeticError):
+        found = _balance_of(shot, gun) if shot else None
+        if found is not None and math.isfinite(found.residual_J):
+            return found
+    raise ValueError(_NO_FLOATS)
+
+
+def _balance_of(shot: Sequence[Segment], gun: GunParameters) -> EnergyBalance:
     supplied, heat, motor, emf, force = (math.fsum(row) for row in zip(*map(_integrals, shot), strict=True))
     friction = math.fsum(_friction_work(segment) for segment in shot)
     impacts = [gun.magnet_mass_kg * segment.end[1] for segment in shot if segment.ended_by == STOP]
@@ -240,6 +283,7 @@ def energy_balance(gun: GunParameters) -> EnergyBalance:
         force_impulse_Ns=force,
         collision_impulse_Ns=-math.fsum(impacts),
         residual_impulse_Ns=force - math.fsum(impacts) - gun.magnet_mass_kg * v,
+        given_up_s=given_up_s(shot),
     )
 
 

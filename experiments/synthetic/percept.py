@@ -130,10 +130,10 @@ def percept_of_summary(shot: ShotSummary, magnet_mass_kg: float, leak_s: float) 
 
 @lru_cache(maxsize=512)
 def percept_of(method: Method, leak_s: float) -> Percept:
-    """The percept of a method's shot by the full model; `SILENT` for a vibration."""
-    if not isinstance(method, GunParameters):
+    """The percept of a method's shot by the full model; `SILENT` for a vibration, and a shot that is given up."""
+    if not isinstance(method, GunParameters) or (shot := _trace(method)).given_up_s is not None:
         return SILENT
-    return percept_of_trace(_trace(method), method.magnet_mass_kg, leak_s)
+    return percept_of_trace(shot, method.magnet_mass_kg, leak_s)
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,7 @@ import numpy as np
 
 from device.parameters import GunParameters
 from device.physics import ShotSummary
-from device.physics.batch import array_kind, compiled, no_compiler
+from device.physics.batch import array_kind, call, compiled, no_compiler
 from device.physics.equations import (
     BREAK_AWAY,
     COIL,
@@ -159,7 +159,8 @@ def _felt(guns: list[Constants], felt: list[list[Feeling]], points: tuple[int, i
         return felt
     gun, feeling, state, series = _records()
     found = np.array([list(map(astuple, some)) for some in felt], feeling)
-    compiled(cast("Any", feel_each))(np.array(guns, gun), found, np.empty(1, state), np.empty(1, series), points)
+    code = compiled(cast("Any", feel_each))
+    call(code, np.array(guns, gun), found, np.empty(1, state), np.empty(1, series), points)
     return [[Feeling(*one) for one in some] for some in found.tolist()]
 
 

@@ -17,7 +17,7 @@ from analysis.paper.paper import ComparisonRow
 from analysis.paper.recurrence import PatternOdds
 from analysis.predict.reproduction.people import drawn_studies, missing_methods, published_of, table_name
 from analysis.predict.reproduction.study import ReproducedStudy
-from analysis.predict.simulate.panels import shot_panel
+from analysis.predict.simulate.panels import shot_panel, smooth_trace
 from analysis.predict.synthetic_studies import pattern_odds
 from analysis.report import placing
 from analysis.report.terminal import Tell
@@ -124,7 +124,8 @@ def _panels(setup: Setup[DesignConfig]) -> Iterator[Any]:
         parameters = setup.gun.rendering(method)
         if isinstance(parameters, GunParameters):
             label = setup.gun.methods[method].label
-            yield shot_panel(f"{label} (friction {parameters.friction_N:g} N)", parameters)
+            title = f"{label} (friction {parameters.friction_N:g} N)"
+            yield shot_panel(title, smooth_trace(parameters), parameters.contact_depth_m)
 
 
 def _notes(study: ReproducedStudy) -> Iterator[str]:

@@ -16,10 +16,12 @@ from analysis.predict.simulate.shot import (
     check_own,
     collision_with_stop,
     in_hand,
+    looked_at,
     method_of,
     parameters_of,
     simulated_shot,
     simulated_vibration,
+    up_to,
     vibration_section,
     write_trace,
 )
@@ -59,8 +61,10 @@ def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str]
 
         return sweep(request, gun, progress, tell)
     found = _shot(request, gun)
-    _write_shot(request, gun, stem, of)
+    followed = _write_shot(request, gun, stem, of)
     _tell_files(request, stem, tell)
+    if followed and request.of_files:
+        tell(f"{' and '.join(request.of_files)}: {followed}; the numbers are of the whole shot")
     _tell_model(request, found.fidelity, tell)
     return found
 
@@ -99,19 +103,20 @@ def _shot(request: SimulateRequest, gun: GunParameters) -> SimulatedShot:
     return replace(
         found,
         scene=pick and with_contact(pick, request.model, gun, speed_m_s),
-        audit=energy_balance(gun) if request.audit else None,
+        audit=looked_at("--audit", energy_balance, gun) if request.audit else None,
         hand=None if request.hand is None else in_hand(gun, request.hand),
         contact=None if stop_N_m is None else collision_with_stop(gun, speed_m_s, stop_N_m),
     )
 
 
-def _write_shot(request: SimulateRequest, gun: GunParameters, stem: Path | None, of: str) -> None:
-    if request.trace:
-        write_trace(gun, request.trace)
+def _write_shot(request: SimulateRequest, gun: GunParameters, stem: Path | None, of: str) -> str:
+    """Trace and figure; how far they follow the shot, if not to its end."""
+    shots = [write_trace(gun, request.trace)] if request.trace else []
     if stem:
         from analysis.predict.simulate.panels import write_plot  # noqa: PLC0415 - as above
 
-        write_plot(gun, stem, of)
+        shots.append(write_plot(gun, stem, of))
+    return up_to(shots[0].given_up_s) if shots else ""
 
 
 def _tell_files(request: SimulateRequest, stem: Path | None, tell: Callable[[str], None]) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from analysis.predict.simulate.scene import ScenePick, scene_section
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_csv
 from device.parameters import GunParameters
-from device.physics import ShotSummary, simulate, trace
+from device.physics import ShotSummary, ShotTrace, simulate, trace
 from device.physics.hand import Collision, HandMechanics, compliant_collision, rigid_collision, simulate_held
 from device.physics.traces import EnergyBalance
 from device.vibration import Vibration, VibrationParameters, solved, waveform
@@ -207,11 +207,28 @@ def header_of(path: Path) -> str:
     return storage.first_line(path).decode("utf-8", "replace").strip()
 
 
-def write_trace(parameters: GunParameters, path: Path) -> None:
-    """The shot over time as CSV; units end the names. `ConfigError` where something else is."""
-    shot = trace(parameters)
-    names = [field.name for field in fields(shot) if field.name != "summary"]
-    _write_columns(path, {name: getattr(shot, name).tolist() for name in names})
+_Looked = TypeVar("_Looked")
+
+
+def looked_at(option: str, look: Callable[[GunParameters], _Looked], gun: GunParameters) -> _Looked:
+    """What an option asks of a shot's course. `ConfigError`: its numbers are beyond what floats can express."""
+    try:
+        return look(gun)
+    except ValueError as error:
+        raise ConfigError(f"{option}: {error}; leave {option} out") from error
+
+
+def write_trace(parameters: GunParameters, path: Path) -> ShotTrace:
+    """The shot over time as CSV; units end the names. `ConfigError` where something else is, or beyond floats."""
+    shot = looked_at("--trace", trace, parameters)
+    arrays = {one.name: getattr(shot, one.name) for one in fields(shot)}
+    _write_columns(path, {name: array.tolist() for name, array in arrays.items() if isinstance(array, np.ndarray)})
+    return shot
+
+
+def up_to(given_up_s: float | None) -> str:
+    """How far a shot's course is followed, if not to its end."""
+    return "" if given_up_s is None else f"up to {given_up_s:.4g} s, where it is more work than is done for a shot"
 
 
 def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
@@ -244,8 +261,10 @@ def _more(found: SimulatedShot) -> Iterator[Section]:
         rows = (
             f"{name:24} {in_words(value):12} {_BALANCE_WORDS.get(name, '')}".rstrip()
             for name, value in asdict(found.audit).items()
+            if name != "given_up_s"
         )
-        yield Section(title="Energy and momentum, full model, until the magnet rests", items=tuple(rows))
+        until = up_to(found.audit.given_up_s) or "until the magnet rests, at most 10 s"
+        yield Section(title=f"Energy and momentum, full model, {until}", items=tuple(rows))
     if found.hand is not None:
         title = "In a hand: enclosure on a spring and damper (numbers of the hand first)"
         yield Section(title=title, items=_rows(found.hand))
