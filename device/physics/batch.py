@@ -127,7 +127,6 @@ def no_compiler() -> str:
     return ""
 
 
-@lru_cache(maxsize=1)
 def machine_code() -> MachineCode:
     """The shots of many guns in machine code. `RecoilError`: there is no compiler."""
     from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler

@@ -24,7 +24,14 @@ from device.physics.equations import (
     StepSeries,
     grip,
 )
-from device.physics.polynomial import first_crossing, least_sum, least_sum_past_first, value_at, value_at_end
+from device.physics.polynomial import (
+    first_crossing,
+    least_sum,
+    least_sum_past_first,
+    look_for,
+    value_at,
+    value_at_end,
+)
 from device.physics.series import (
     clear,
     expand,
@@ -221,8 +228,7 @@ def finish_step(p: Constants, s: ShotState, w: StepSeries, span: float, event: i
     if at <= used:
         used, event = at, COIL_EDGE if s.heading > 0.0 else STOP
     if s.recoiling and s.heading > 0.0 and w.i[0] > 0.0 and least_sum(w.i, 1.0) <= 0.0:
-        for n in range(ORDER + 1):
-            w.other[n] = w.i[n]
+        look_for(w, w.i, 1.0)
         at = first_crossing(w)
         if at < used:
             used, event = at, FORCE_ZERO
@@ -240,9 +246,10 @@ def first_turn(w: StepSeries, heading: float) -> float:
     least = least_sum_past_first(w.v, heading)
     if (least if shift == 1 else heading * w.v[0] + min(0.0, least)) > 0.0:
         return 2.0
-    for n in range(ORDER + 1 - shift):
-        w.other[n] = heading * w.v[n + shift]
+    look_for(w, w.v, heading)
     if shift == 1:
+        for n in range(ORDER):
+            w.other[n] = w.other[n + 1]
         w.other[ORDER] = 0.0
     return first_crossing(w) if w.other[0] > 0.0 else 0.0
 
@@ -252,8 +259,7 @@ def first_arrival(p: Constants, w: StepSeries, heading: float) -> float:
     ahead = (p.coil_reach if heading > 0.0 else 0.0) - w.x[0]
     if heading * ahead + min(0.0, least_sum_past_first(w.x, -heading)) > 0.0:
         return 2.0
-    for n in range(1, ORDER + 1):
-        w.other[n] = -heading * w.x[n]
+    look_for(w, w.x, -heading)
     w.other[0] = heading * ahead
     return first_crossing(w) if w.other[0] > 0.0 else 0.0
 

@@ -158,6 +158,15 @@ value_at_end: Callable[[Coefficients], float] = from_text("value_at_end", "c", _
 """The polynomial of even order at s = 1."""
 
 
+def _look_for() -> Iterator[str]:
+    yield "other = w.other"
+    yield from (f"other[{n}] = sign * c[{n}]" for n in range(ORDER + 1))
+
+
+look_for: Callable[[StepSeries, Coefficients, float], None] = from_text("look_for", "w, c, sign", _look_for)
+"""Has a polynomial, times `sign`, in `other`, where its roots are looked for."""
+
+
 def bernstein_over(w: StepSeries, low: float, high: float) -> None:
     """The Bernstein coefficients over [low, high] of the polynomial in `other`."""
     w.work += 1

@@ -23,7 +23,7 @@ or current and speed follow the position, without it depending on L and m.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from device.physics.equations import ORDER, Coefficients, Constants, ShotState, StepSeries, friction
@@ -257,19 +257,16 @@ def size_ratio(a: float, b: float) -> float:
     return part if part >= 0.0 else math.inf
 
 
-def rescale(w: StepSeries, factor: float) -> None:
-    """The series over a step `factor` times as long."""
-    x, v, i = w.x, w.v, w.i
-    square, odd = factor * factor, factor
-    for n in range(1, ORDER, 2):
-        even = odd * factor
-        x[n] *= odd
-        v[n] *= odd
-        i[n] *= odd
-        x[n + 1] *= even
-        v[n + 1] *= even
-        i[n + 1] *= even
-        odd *= square
+def _rescale() -> Iterator[str]:
+    yield "x, v, i, f1, square = w.x, w.v, w.i, factor, factor * factor"
+    for n in range(1, ORDER + 1):
+        if n > 1:
+            yield f"f{n} = f{n - 1} * factor" if n % 2 == 0 else f"f{n} = f{n - 2} * square"
+        yield from (f"{c}[{n}] *= f{n}" for c in "xvi")
+
+
+rescale: Callable[[StepSeries, float], None] = from_text("rescale", "w, factor", _rescale)
+"""The series over a step `factor` times as long."""
 
 
 def fitted_span(p: Constants, s: ShotState, span: float, w: StepSeries) -> float:
