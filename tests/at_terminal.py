@@ -67,9 +67,13 @@ class AtTerminal:
             if not data:
                 return
 
+    def press(self, keys: str) -> None:
+        """Press keys, and no Enter behind them."""
+        os.write(self._ours, keys.encode())
+
     def type(self, text: str) -> None:
         """Type a line."""
-        os.write(self._ours, f"{text}\n".encode())
+        self.press(f"{text}\n")
 
     def wait_for(self, text: str, count: int = 1, timeout_s: float = 60) -> None:
         """Wait until the screen has shown `text` so many times; `AssertionError` with the screen if it does not."""

@@ -105,6 +105,7 @@ def test_what_fires_a_train_does_not_end_it_and_what_pauses_or_halts_it_does(tmp
         ("Key_unknown", "\u0e34", 56, "B"),  # of Thai
         ("Key_Semicolon", ";", 24, "Q"),  # a Greek keyboard
         ("Key_Slash", "/", 24, "Q"),  # a Hebrew one
+        ("Key_Slash", "\x1f", 24, "Q"),  # the same with Ctrl
         ("Key_unknown", "€", 26, "#33554431"),
     ],
 )

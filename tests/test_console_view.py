@@ -272,6 +272,8 @@ def test_what_the_gun_said_before_an_emergency_stop_says_nothing_of_what_it_is_a
     assert "SWITCH OFF ITS POWER" in instruction(before).damper
     after = replace(before, gun=GunSeen(status=disarmed, asked_s=5.0))
     assert instruction(after).damper == "The gun itself says that it is disarmed."
+    silent = replace(after, now_s=6.5)
+    assert "SWITCH OFF ITS POWER" in instruction(silent).damper
     armed = replace(before, gun=GunSeen(status=status_of("armed"), asked_s=5.1))
     assert "does not say that it is disarmed" in instruction(armed).damper
 
@@ -385,7 +387,8 @@ def test_a_pause_names_the_key_that_starts_a_lost_participants_screen_again() ->
     [
         (9.9, "armed", 10.5, ""),
         (10.1, "disarmed", 10.5, "The gun is disarmed."),
-        (10.1, "disarmed", 60.0, "The gun is disarmed."),
+        (59.9, "disarmed", 60.0, "The gun is disarmed."),
+        (58.0, "disarmed", 60.0, "SWITCH OFF ITS POWER."),  # it has said nothing since
         (10.1, "resetting", 10.5, ""),
         (10.1, "armed", 11.5, "SWITCH OFF ITS POWER."),
         (9.9, "disarmed", 11.5, "SWITCH OFF ITS POWER."),

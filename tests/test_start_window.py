@@ -1575,7 +1575,8 @@ def test_an_emergency_stop_behind_a_test_shot_counts(
             key(window, "F12")
         until(lambda: len(owed_shots(study.results)) == 1)
         assert window.shots.title.text() == "EMERGENCY STOP"
-        assert window.shots.detail.toPlainText().startswith(f"{fired} That was over when you stopped it")
+        assert window.shots.detail.toPlainText().startswith("The test shot was over, and the gun is not asked any more")
+        assert window.shots.detail.toPlainText().endswith(f"It had ended so: {fired}")
         key(window, "T", CTRL)
         assert not window.shots.is_running
         (owed,) = owed_shots(study.results)

@@ -360,13 +360,14 @@ def train_shots(folder: Path) -> int:
     return sum(one["kind"] == "shot" for one in preference_journal(folder))
 
 
-def test_a_train_fires_no_shot_while_the_terminal_cannot_show_what_was_typed(
-    quick_configs: Path, tmp_path: Path
+@pytest.mark.parametrize("typed", ["", "x\n"], ids=["nothing", "a line"])
+def test_a_train_fires_no_shot_while_the_terminal_shows_nothing(
+    typed: str, quick_configs: Path, tmp_path: Path
 ) -> None:
     with AtTerminal(run(quick_configs, "preference", "--seed", 1), tmp_path) as screen:
         screen.fire()
         screen.wait_for("Enter when the participant says next:")
-        screen.type(f"{HELD}x")
+        screen.press(f"{HELD}{typed}")
         wait_for(lambda: any(one.get("body", {}).get("kind") == "paused" for one in preference_journal(tmp_path)))
         before = train_shots(tmp_path)
         time.sleep(1.0)  # this is how long a train would have fired on

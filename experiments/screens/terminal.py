@@ -28,7 +28,7 @@ from experiments.session.events import Event, Press
 from experiments.session.history import entered_value
 from experiments.session.judging import BEAT_S
 from experiments.session.remarks import Remark, flag_word
-from experiments.session.states import EMERGENCY, Position, State
+from experiments.session.states import ARMED, EMERGENCY, Position, State
 from experiments.session.steps import Ask, Asking, Describe, Inform, Outcome, Prepare, Rate, Rest, Step
 
 if TYPE_CHECKING:
@@ -257,9 +257,12 @@ class TerminalScreen:
     def _beat(self) -> None:
         """Beat: where the program stands still nothing does, and what was typed meanwhile is known by that.
 
-        So it does where nothing can be shown: who reads what is typed may be waiting to answer.
+        So it does where nothing can be shown: who reads what is typed may be waiting to answer. While shots follow each
+        other nothing else is shown, so whether it can be is tried.
         """
         while self._live is not None and self._shown.state is not State.STOPPED:
+            if self._shown.state in ARMED and self._out.isatty():
+                self._show(_staying(""))
             if self._clock.now() - self._writing_s < _HELD_S:
                 self._live.beats.beat()
             time.sleep(BEAT_S)
@@ -300,8 +303,12 @@ _COUNTED = len("  1800 s ")
 
 def _counted(left_s: float) -> str:
     """A count at the start of a line that leaves what is typed behind it as it stands, where a terminal can do that."""
-    text = f"\r  {left_s:4.0f} s "
-    return text if os.environ.get("TERM", "dumb") == "dumb" else f"\x1b7{text}\x1b8"
+    return _staying(f"\r  {left_s:4.0f} s ")
+
+
+def _staying(text: str) -> str:
+    """A text behind which the cursor goes back to where it was, where a terminal can do that."""
+    return text or _UNSEEN if os.environ.get("TERM", "dumb") == "dumb" else f"\x1b7{text}\x1b8"
 
 
 def _corrects_words(position: Position) -> bool:

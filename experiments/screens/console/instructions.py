@@ -321,11 +321,14 @@ def _since_halt(seen: Seen) -> str:
 
 
 def _says_disarmed(seen: Seen, since_s: float) -> bool | None:
-    """Whether the gun says that it is disarmed; `None` if it was not asked since then."""
+    """Whether the gun says that it is disarmed; `None` if it was not asked since then.
+
+    What it said before it fell silent says nothing of now.
+    """
     gun = seen.gun
     if gun is None or gun.asked_s < since_s:
         return None
-    return gun.status is not None and gun.status.state == "disarmed"
+    return not seen.gun_silent_s and gun.status is not None and gun.status.state == "disarmed"
 
 
 def _closing(seen: Seen) -> Instruction:

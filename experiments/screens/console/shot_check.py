@@ -48,7 +48,7 @@ RESULT_S = 0.5
 class ShotProgress:
     """What a test shot has to tell: how far it is, the seconds until the shot, and at the end what came of it."""
 
-    phase: Literal["opening", "counting", "firing", "over"]
+    phase: Literal["opening", "counting", "arming", "firing", "over"]
     seconds: int = 0
     fired: bool = False
     text: str = ""
@@ -147,9 +147,11 @@ class ShotCheck:
 
     def _armed_shot(self, gun: Gun, drive: Drive, began_s: float) -> ShotReport | None:
         """As the runner fires the first shot of a stimulus: armed for it alone, as soon as the magnet is home."""
-        self._tell(ShotProgress(phase="firing"))
+        self._tell(ShotProgress(phase="arming"))
         gun.arm()
-        if self._off.wait(max(0.0, gun.status().ready_at_s - self._clock.now())) or not self._is_heard(began_s):
+        ready_at_s = gun.status().ready_at_s
+        self._tell(ShotProgress(phase="firing"))
+        if self._off.wait(max(0.0, ready_at_s - self._clock.now())) or not self._is_heard(began_s):
             return None
         return gun.fire(Shot(method=self._method, direction="forward", drive=drive))
 
@@ -287,7 +289,8 @@ class ShotPage(QWidget):
         if is_new:
             self._owe()
         over = phrase(
-            "{outcome} That was over when you stopped it: a test shot comes first, whatever is done next.",
+            "The test shot was over, and the gun is not asked any more: if in doubt, switch off its power. "
+            "A test shot comes first, whatever is done next. It had ended so: {outcome}",
             outcome=self._shown_detail[0],
         )
         self._show(phrase("EMERGENCY STOP"), DISARMING if self.is_running else over, "bad")
@@ -372,7 +375,9 @@ class ShotPage(QWidget):
                 "ask",
             )
             self.count.setText(str(told.seconds))
-        elif told.phase == "firing":
+        elif told.phase == "arming":
+            self._show(phrase("STAND CLEAR"), phrase("{shown}: the gun is being armed.", shown=self._shown), "ask")
+        else:
             self._show(phrase("Firing"), self._shown, "wait")
 
     def _end(self, told: ShotProgress) -> None:

@@ -412,11 +412,11 @@ def key_name(event: QKeyEvent) -> str:
         return named
     if key < _ASCII_END and chr(key).isalnum():  # Qt's numbers of letters and digits are those of ASCII
         return chr(key)
-    is_letter = _is_of_other_alphabet(event.text()) or (place == _Q_PLACE and event.text() in _ON_Q)
+    is_letter = _is_of_other_alphabet(event.text()) or (place == _Q_PLACE and key in _ON_Q)
     return _DIGITS.get(place) or (_PLACES.get(place) if is_letter else None) or f"#{key}"
 
 
-_Q_PLACE, _ON_Q = 24, (";", "/")
+_Q_PLACE, _ON_Q = 24, (QtCore.Qt.Key.Key_Semicolon, QtCore.Qt.Key.Key_Slash)
 """The place of Q, and what Greek and Hebrew keyboards have there, which no Latin one has."""
 
 
