@@ -24,6 +24,7 @@ from analysis.predict.power.page import claim_name, in_short
 from analysis.predict.power.planned import ALL_PAIRS, ANOVA
 from analysis.report.labels import labelled
 from analysis.report.serial import plain
+from analysis.report.terminal import say_how_long
 from experiments.config.door import ConfigError, leaves
 from experiments.load import load_setup, shipped_folder
 from experiments.synthetic.laws import SyntheticAnswers
@@ -111,6 +112,24 @@ def test_the_same_seed_gives_the_same_bytes_on_two_processes(done: Path, recoil:
 
 
 @pytest.mark.slow
+def test_how_long_it_takes_grows_with_people_and_studies_and_falls_with_workers_and_shards() -> None:
+    few, many = (PowerRequest(config="direction", participants=people) for people in ("8", "8-40"))
+    long_s = feature.power_time_s(many, workers=1)
+    assert long_s > 10 * feature.power_time_s(few, workers=1)
+    assert feature.power_time_s(many, workers=4) < 0.4 * long_s
+    assert feature.power_time_s(many, workers=1, part=feature.shard_number("1/8")) < 0.3 * long_s
+    assert feature.power_time_s(PowerRequest(config="preference", participants="8-40"), workers=1) < 0.4 * long_s
+    assert feature.power_time_s(many, scheduler="tcp://somewhere:8786") == 0.0
+
+
+def test_what_takes_long_says_so_beforehand(capsys: pytest.CaptureFixture[str]) -> None:
+    say_how_long(4.0)
+    assert capsys.readouterr().err == ""
+    for seconds, words in ((27.0, "30 s"), (310.0, "5 minutes")):
+        say_how_long(seconds)
+        assert capsys.readouterr().err == f"recoil: this takes about {words}\n"
+
+
 def test_another_seed_gives_other_studies(done: Path, recoil: Recoil, tmp_path: Path) -> None:
     again = recoil("power", "direction", *SMALL, "--seed", "2", "--workers", "1", "--out", "other", "--json")
     found = json.loads(again.stdout)

@@ -2,7 +2,7 @@
 
 import json
 import os
-from dataclasses import fields
+from dataclasses import asdict, fields
 
 import pytest
 
@@ -10,6 +10,7 @@ from analysis.predict.simulate.panels import write_plot
 from device.physics import GunParameters, simulate
 from device.physics.hand import HandMechanics, compliant_collision, simulate_held
 from device.physics.traces import energy_balance
+from experiments.load import find, load_gun
 from tests import figure_files
 
 pytestmark = pytest.mark.slow
@@ -185,3 +186,18 @@ def test_the_course_of_a_shot_beyond_floats_is_refused(recoil, tmp_path, option,
     done = recoil("simulate", "--set", number, *words)
     assert done.returncode == 2
     assert f"{option}: this shot goes beyond what numbers can express; leave {option} out" in done.stderr
+
+
+def test_a_shot_names_what_is_not_the_papers_and_what_is_assumed(recoil):
+    said = recoil("simulate", "--method", "asymmetric-2", "--set", "voltage_V=20", "--set", "emf=reciprocal").stdout
+    options = "friction_N 1.12, voltage_V 20, drive_off shorted, emf reciprocal"
+    assert said.startswith(f"One shot, model full, {options}\n")
+
+
+@pytest.mark.parametrize("method", ["asymmetric-2", "vibration"])
+def test_beside_a_trace_stands_what_it_was_made_with(method, recoil, tmp_path):
+    assert recoil("simulate", "--method", method, "--trace", tmp_path / "t.csv").returncode == 0
+    about = json.loads((tmp_path / "t.csv.json").read_text(encoding="utf-8"))
+    parameters = load_gun(find("gun")).rendering(method)
+    assert about["parameters"] == json.loads(json.dumps(asdict(parameters)))
+    assert about["provenance"]["numpy"]

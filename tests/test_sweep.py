@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -123,6 +124,22 @@ def test_few_shots_wait_for_no_compiler(tmp_path, monkeypatch):
     swept(tmp_path / "few.csv", "friction_N=0.1:1.2:6")
     with pytest.raises(ZeroDivisionError):
         swept(tmp_path / "many.csv", "friction_N=0.1:1.2:7")
+
+
+@pytest.mark.parametrize(
+    ("words", "few"),
+    [
+        ("friction_N=0:2:3", shots.FEW_SHOTS),
+        ("drive_off=open,shorted", shots.FEW_SHOTS),
+        ("return_friction_N=0.1,1e6", shots.FEW_SHOTS),
+        ("magnet_mass_kg=log:1e-6:0.1:3", shots.FEW_FAR_SHOTS),
+        ("voltage_V=16,1600", shots.FEW_FAR_SHOTS),
+    ],
+)
+def test_guns_far_from_the_papers_wait_for_the_compiler_sooner(words, few):
+    """One of them may take a second, interpreted."""
+    assert shots.few_shots(GUN, [shots.axis_of(words, GUN)]) == few
+    assert shots.few_shots(replace(GUN, inductance_H=1.0), []) == shots.FEW_FAR_SHOTS
 
 
 @pytest.mark.parametrize(

@@ -64,11 +64,16 @@ def say(text: str) -> None:
 _LONG_S = 10.0
 
 
+def how_long(seconds: float) -> str:
+    """Of what takes over ten seconds on a usual machine, about how long that is; empty for less."""
+    about = f"{seconds / 60:.0f} minutes" if seconds > 100 else f"{10 * round(seconds / 10)} s"
+    return f"this takes about {about}" if seconds > _LONG_S else ""
+
+
 def say_how_long(seconds: float) -> None:
-    """Of what takes over ten seconds on a usual machine, say beforehand about how long that is."""
-    if seconds > _LONG_S:
-        about = f"{seconds / 60:.0f} minutes" if seconds > 100 else f"{10 * round(seconds / 10)} s"
-        say(f"recoil: this takes about {about}")
+    """Say it beforehand."""
+    if words := how_long(seconds):
+        say(f"recoil: {words}")
 
 
 def in_text(section: Section) -> str:

@@ -115,6 +115,8 @@ def _of_shard(
     from analysis.predict.power import run as feature
 
     number = feature.shard_number(shard)
+    if not (out / number.file_name).exists():
+        say_how_long(feature.power_time_s(request, workers, scheduler, number))
     part, was_there = feature.power_shard(request, number, out, progress, workers=workers, scheduler=scheduler)
     show(part, feature.shard_in_short(part, out, was_there=was_there), as_json)
 
@@ -125,6 +127,7 @@ def _of_studies(
     from analysis.predict.power import run as feature
 
     if merge is None:
+        say_how_long(feature.power_time_s(request, workers, scheduler))
         found = feature.power(request, out, progress, workers, scheduler)
     else:
         found = feature.merged_power(merge, request, out)
@@ -147,9 +150,10 @@ def _check_only(ctx: typer.Context, why: str, known: tuple[str, ...]) -> None:
 
 def _of_threshold(config: str, trials: str | None, people: int | None, seed: int, out: Path, as_json: bool) -> None:
     from analysis.predict.threshold_plan import page
-    from analysis.predict.threshold_plan.run import PEOPLE, TRACK_TRIALS, ThresholdRequest
+    from analysis.predict.threshold_plan.run import PEOPLE, TRACK_TRIALS, ThresholdRequest, plan_time_s
 
     request = ThresholdRequest(config=config, trials=trials or TRACK_TRIALS, people=people or PEOPLE, seed=seed)
+    say_how_long(plan_time_s(request))
     found = page.threshold_plan(request, out, progress)
     show(found, f"{in_text(page.plan_in_short(found))}\nReport: {out / 'report.html'}", as_json)
 

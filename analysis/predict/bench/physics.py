@@ -182,8 +182,9 @@ def _digits_bought(rows: Sequence[ModelTime]) -> Iterator[Bought]:
                 yield Bought(
                     more="digit of a shot",
                     where=f"coil {drive_off}, {how}: {more.fidelity}, not {less.fidelity}",
-                    costs=_us(longer_us / gained),
-                    buys=f"{gained:.1f} digits in all: an error of {max(more.error, _EXACT):.1g}, not {less.error:.1g}",
+                    costs=f"{_us(longer_us / gained)} a digit",
+                    buys=f"{gained:.1f} digits for {_us(longer_us)}: an error of {max(more.error, _EXACT):.1g}, "
+                    f"not {less.error:.1g}",
                 )
 
 

@@ -13,6 +13,7 @@ from shlex import quote
 
 from pydantic import TypeAdapter
 
+from analysis.predict.drawn import RatingStudies
 from analysis.predict.jobs import RunPieces, on_cluster, on_processes
 from analysis.predict.power.grid import Chunk, Grid, PowerRequest, make_grid, run_chunk
 from analysis.predict.power.page import grid_assumptions, in_short, sections
@@ -40,7 +41,31 @@ from experiments.config.setup import sha256
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["PowerRequest", "in_short", "merged_power", "power", "power_shard", "shard_in_short", "shard_number"]
+__all__ = [
+    "PowerRequest",
+    "in_short",
+    "merged_power",
+    "power",
+    "power_shard",
+    "power_time_s",
+    "shard_in_short",
+    "shard_number",
+]
+
+_AROUND_S = 3.0  # start, figures and report
+_RATES_S, _JUDGES_S = 0.5e-6, 2.2e-6  # of a person who rates, or tells directions, on one core
+
+
+def power_time_s(
+    request: PowerRequest, workers: int | None = None, scheduler: str | None = None, part: ShardNumber | None = None
+) -> float:
+    """About how long that takes, or one part of it; 0 on a cluster, of which nobody knows."""
+    if scheduler is not None:
+        return 0.0
+    chunks = make_grid(request).chunks()
+    numbers = range(len(chunks)) if part is None else part.pieces(chunks)
+    each_s = [one.people * (_RATES_S if isinstance(one.config, RatingStudies) else _JUDGES_S) for one in chunks]
+    return _AROUND_S + sum(each_s[number] for number in numbers) / (workers or cores())
 
 
 def power(

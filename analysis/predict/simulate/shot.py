@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.predict.simulate.scene import ScenePick, scene_section
 from analysis.report.section import Section
-from analysis.report.serial import OPTIONAL, as_csv
+from analysis.report.serial import OPTIONAL, as_csv, as_json
 from device.parameters import GunParameters
 from device.physics import ShotSummary, ShotTrace, simulate, trace
 from device.physics.hand import Collision, HandMechanics, compliant_collision, rigid_collision, simulate_held
@@ -21,6 +21,7 @@ from device.vibration import Vibration, VibrationParameters, solved, waveform
 from experiments.config.door import ConfigError
 from experiments.config.setup import GunConfig
 from experiments.record import storage
+from experiments.record.provenance import provenance
 
 FULL_MODEL = "full model, enclosure held still, rigid stop"
 """What figures and traces of a shot are of."""
@@ -222,8 +223,22 @@ def write_trace(parameters: GunParameters, path: Path) -> ShotTrace:
     """The shot over time as CSV; units end the names. `ConfigError` where something else is, or beyond floats."""
     shot = looked_at("--trace", trace, parameters)
     arrays = {one.name: getattr(shot, one.name) for one in fields(shot)}
-    _write_columns(path, {name: array.tolist() for name, array in arrays.items() if isinstance(array, np.ndarray)})
+    columns = {name: array.tolist() for name, array in arrays.items() if isinstance(array, np.ndarray)}
+    _write_columns(path, columns, _origin(FULL_MODEL, parameters))
     return shot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraceOrigin:
+    """Where a trace comes from, written beside it."""
+
+    model: str
+    parameters: dict[str, float | str | None]
+    provenance: dict[str, str]
+
+
+def _origin(model: str, parameters: GunParameters | VibrationParameters) -> TraceOrigin:
+    return TraceOrigin(model=model, parameters=asdict(parameters), provenance=provenance())
 
 
 def up_to(given_up_s: float | None) -> str:
@@ -231,28 +246,28 @@ def up_to(given_up_s: float | None) -> str:
     return "" if given_up_s is None else f"up to {given_up_s:.4g} s, where it is more work than is done for a shot"
 
 
-def _write_columns(path: Path, columns: Mapping[str, Sequence[float]]) -> None:
-    """Columns of one length as CSV; the folder is made if it is missing."""
+def _write_columns(path: Path, columns: Mapping[str, Sequence[float]], origin: TraceOrigin) -> None:
+    """Columns of one length as CSV, and beside it where they come from; the folder is made if it is missing."""
     check_own("--trace", path, lambda there: header_of(there) == ",".join(columns))
     storage.make_folder(path.parent)
     storage.write_whole(path, as_csv(columns, zip(*columns.values(), strict=True)))
+    storage.write_whole(path.with_name(f"{path.name}.json"), as_json(origin))
 
 
 def sections(found: SimulatedShot) -> tuple[Section, ...]:
-    """The shot in words: one number a line, units in the names; the pick before it, what else was asked for after."""
-    p = found.parameters
-    options = {
-        "friction_N": p.friction_N,
-        "return_friction_N": p.return_friction_N,
-        "drive_off": f"{p.drive_off}{_NO_COIL if found.fidelity == 'ballistic' else ''}",
-        "emf": p.emf,
-    }
-    said = ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
+    """The shot in words, with its options: one number a line; the pick before it, what else was asked for after."""
+    values, usual = asdict(found.parameters), asdict(GunParameters())
+    named = {key: value for key, value in values.items() if key in _ALWAYS_NAMED or value != usual[key]}
+    if found.fidelity == "ballistic":
+        named["drive_off"] = f"{named['drive_off']}{_NO_COIL}"
+    said = ", ".join(f"{key} {in_words(value)}" for key, value in named.items() if value is not None)
     scene = () if found.scene is None else (scene_section(found.scene),)
     shot = Section(title=f"One shot, model {found.fidelity}, {said}", items=_rows(found.summary))
     return *scene, shot, *_more(found)
 
 
+_ALWAYS_NAMED = ("friction_N", "drive_off", "emf")
+"""Of a shot's options; others where they are not the paper's."""
 _NO_COIL = " until the recoil is over (then no coil)"
 
 
@@ -294,7 +309,8 @@ def simulated_vibration(parameters: VibrationParameters, trace_file: Path | None
         raise ConfigError(f"vibration: {error}") from error
     if trace_file:
         time_s, acceleration = waveform(parameters, VIBRATION_POINTS)
-        _write_columns(trace_file, {"time_s": time_s.tolist(), "acceleration_m_s2": acceleration.tolist()})
+        columns = {"time_s": time_s.tolist(), "acceleration_m_s2": acceleration.tolist()}
+        _write_columns(trace_file, columns, _origin("vibration", parameters))
     return SimulatedVibration(parameters=parameters, summary=_vibration_summary(parameters, vibration))
 
 

@@ -13,6 +13,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -27,7 +28,7 @@ from analysis.predict.simulate.scene import ScenePick, picked, scene_section
 from analysis.predict.simulate.shot import PARAMETER_KINDS, check_own, header_of
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_json
-from analysis.report.terminal import Progress
+from analysis.report.terminal import Progress, how_long
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
 from device.physics.batch import no_compiler
@@ -173,9 +174,13 @@ MOST_ROWS = 10_000_000
 """Of a table, unless --yes; and of values of one parameter."""
 FEW_SHOTS = 500
 """So many shots are interpreted, at about a millisecond each: the compiler's code takes longer to load, and half a
-minute to make. Which it is goes by their number alone, so the same command writes the same bytes."""
+minute to make. Which it is goes by their number and the guns' alone, so the same command writes the same bytes."""
+FEW_FAR_SHOTS = 20
+"""The same of guns far from the paper's, of which one may take a second."""
+_INTERPRETED_S, _COMPILED_S = 1e-3, 7e-6  # of a shot and its row
+_FAR = 30.0  # times one of the paper's numbers, or a part of it
 _BLOCK = 65_536  # shots between two words of progress, compiled
-_SLOW_BLOCK = 256  # and interpreted
+_SLOW_BLOCK = 64  # and interpreted
 _FORMS = "FROM:TO:COUNT, log:FROM:TO:COUNT or A,B,C"
 
 
@@ -198,12 +203,16 @@ def sweep(request: SimulateRequest, gun: GunParameters, progress: Progress, tell
     path, rows = request.table, math.prod(len(axis.values) for axis in axes)
     _is_sensible(request, fidelity, rows)
     check_place(path)
-    if rows > FEW_SHOTS:
+    interpreted = rows <= few_shots(gun, axes) or bool(no_compiler())
+    if not interpreted or rows > FEW_SHOTS:
         tell(waiting_note())
+    if words := how_long(rows * (_INTERPRETED_S if interpreted else _COMPILED_S)):
+        tell(words)
     origin = _origin(gun, fidelity, axes, rows)
     counts = np.zeros(len(STATUSES), dtype=np.int64)
     with opened(path, {axis.key: PARAMETER_KINDS[axis.key] for axis in axes}, origin) as write:
-        for arrays, shots in _shoot(gun, fidelity, axes, progress):
+        shoot = partial(simulate_batch, gun, fidelity=fidelity, interpreted=interpreted)
+        for arrays, shots in _shoot(shoot, axes, _SLOW_BLOCK if interpreted else _BLOCK, progress):
             write(arrays, shots)
             counts += np.bincount(shots.status, minlength=len(STATUSES))
     statuses: dict[str, int] = {name: int(count) for name, count in zip(STATUSES, counts, strict=True) if count}
@@ -211,20 +220,29 @@ def sweep(request: SimulateRequest, gun: GunParameters, progress: Progress, tell
     return Sweep(**known, table=str(path), statuses=statuses, scene=pick)
 
 
+def few_shots(gun: GunParameters, axes: Sequence[SweepAxis]) -> int:
+    """So many shots of these guns are interpreted."""
+    varied = {axis.key: axis.values for axis in axes}
+    paper = GunParameters()
+    for one in fields(gun):
+        usual, values = getattr(paper, one.name), np.atleast_1d(varied.get(one.name, getattr(gun, one.name)))
+        if isinstance(usual, float) and np.any((values > _FAR * usual) | ((values < usual / _FAR) & (values > 0.0))):
+            return FEW_FAR_SHOTS
+    return FEW_SHOTS
+
+
 def _shoot(
-    gun: GunParameters, fidelity: str, axes: Sequence[SweepAxis], progress: Progress
+    shoot: Callable[..., ShotBatch], axes: Sequence[SweepAxis], block: int, progress: Progress
 ) -> Iterator[tuple[dict[str, NDArray[Any]], ShotBatch]]:
     """Block by block: the parameters that vary, and the shots."""
     shape = tuple(len(axis.values) for axis in axes)
     rows = math.prod(shape)
-    interpreted = rows <= FEW_SHOTS or bool(no_compiler())
-    block = _SLOW_BLOCK if interpreted else _BLOCK
     with progress("shots", math.ceil(rows / block)) as done:
         for start in range(0, rows, block):
             end = min(start + block, rows)
             places = np.unravel_index(np.arange(start, end), shape)
             arrays: dict[str, Any] = {axis.key: axis.values[place] for axis, place in zip(axes, places, strict=True)}
-            yield arrays, simulate_batch(gun, fidelity=fidelity, interpreted=interpreted, **arrays)
+            yield arrays, shoot(**arrays)
             done(f"{end:,} of {rows:,}")
 
 

@@ -117,6 +117,15 @@ def people_fitted(request: ThresholdRequest) -> int:
     return len(procedures_of(request.config)) * len(_trials(request)) * request.people
 
 
+_AROUND_S, _FIT_S, _TRIAL_S = 2.0, 4e-3, 1e-4  # start and report, a person's fit, and each trial that they did
+
+
+def plan_time_s(request: ThresholdRequest) -> float:
+    """About how long `threshold_power` takes with its page. `ConfigError` as there."""
+    fits = len(procedures_of(request.config)) * request.people
+    return _AROUND_S + sum(fits * (_FIT_S + _TRIAL_S * count) for count in _trials(request))
+
+
 def threshold_power(request: ThresholdRequest, tell: Callable[[str], None] = untold) -> ThresholdPower:
     """Simulate people at each procedure, and fit them as the analysis will. `ConfigError`: nothing to be planned."""
     planned = _planned(load_setup(find(request.config)))
