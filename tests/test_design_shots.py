@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from analysis.predict.design_search.choice import both_ways, evidences, logits, predict, rates
 from analysis.predict.design_search.felt import COIL_POINTS, FREE_POINTS, Feeling, feel_on, percepts_of_shots
-from analysis.predict.design_search.run import compiler_note
+from analysis.predict.design_search.run import waiting_note
 from analysis.predict.design_search.space import FrictionRow, shots, simulate_rows
 from analysis.predict.fit.percept_model import PAPER_RATES, fit_percept, predicted_rate
 from analysis.predict.jobs import one_by_one
@@ -127,7 +127,7 @@ def test_without_the_compiler_the_workers_simulate(monkeypatch: pytest.MonkeyPat
     ((shot,),) = simulate_rows([row], run, lambda _words: None)
     assert shot.status == HOME
     assert asked == [row]
-    assert "recoil[fast]" in compiler_note()
+    assert "recoil[fast]" in waiting_note()
 
 
 def test_a_shot_without_bullet_firing_says_nothing_by_its_summary() -> None:

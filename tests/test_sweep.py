@@ -113,7 +113,7 @@ def test_without_the_compiler_the_numbers_are_the_same_and_it_is_said(tmp_path, 
     swept(tmp_path / "slow.parquet", "friction_N=0.1:1.2:5")
     fast, slow = (pq.read_table(tmp_path / f"{name}.parquet").to_pydict() for name in ("fast", "slow"))
     assert slow["impact_speed_m_s"] == pytest.approx(fast["impact_speed_m_s"], rel=1e-12)
-    assert "recoil[fast]" in shots.waiting_note()
+    assert "recoil[fast]" in batch.compiler_note()
 
 
 def test_few_shots_wait_for_no_compiler(tmp_path, monkeypatch):

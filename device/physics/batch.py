@@ -127,6 +127,15 @@ def no_compiler() -> str:
     return ""
 
 
+def compiler_note(
+    interpreted: str = "about a millisecond a shot; compiled it takes microseconds", made_in: str = "half a minute"
+) -> str:
+    """What to say before many shots: how they are worked out, and how long it takes until they are compiled."""
+    if why := no_compiler():
+        return f"note: interpreted, {interpreted}, and {why}"
+    return f"note: compiled, which takes about {made_in} the first time on a machine and a second or two later on"
+
+
 def machine_code() -> MachineCode:
     """The shots of many guns in machine code. `RecoilError`: there is no compiler."""
     from device.physics.lanes import shoot_each  # noqa: PLC0415 - it is for the compiler

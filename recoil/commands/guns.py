@@ -171,8 +171,11 @@ def bench(
     if unknown:
         raise typer.BadParameter(f"no part {', '.join(sorted(unknown))}; there are {', '.join(feature.PARTS)}")
     request = feature.BenchRequest(seed=seed, repeats=repeats, batch=batch, progress=progress)
-    say_how_long(feature.bench_time_s(parts or list(feature.PARTS), request))
-    found = feature.bench(out, parts or [], request)
+    chosen = list(dict.fromkeys(parts or feature.PARTS))
+    if "physics" in chosen:
+        say(feature.compiler_note())
+    say_how_long(feature.bench_time_s(chosen, request))
+    found = feature.bench(out, chosen, request)
     lines = [f"  {line}" for line in feature.trade_lines(found)]
     said = [*([feature.TRADES, *lines] if lines else []), f"Report: {out / 'report.html'}"]
     show(found.content, "\n".join(said), as_json)

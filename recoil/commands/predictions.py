@@ -205,7 +205,7 @@ def design(
         seed=seed,
     )
     say_how_long(feature.search_time_s(request, workers))
-    say(feature.compiler_note())
+    say(feature.waiting_note())
     found = feature.design(request, workers, out, progress)
     show(found, f"{in_text(feature.in_short(found))}\nReport: {out / 'report.html'}", as_json)
     raise end(exceptions=found.best is None)

@@ -18,10 +18,11 @@ from analysis.report import placing
 from analysis.report.page import write_page
 from analysis.report.section import Picture, Section, Table, origin_table
 from analysis.report.serial import as_json
+from device.physics.batch import compiler_note
 from experiments.record import storage
 from experiments.record.provenance import provenance
 
-__all__ = ["PARTS", "TRADES", "Bench", "BenchRequest", "bench", "bench_time_s", "trade_lines"]
+__all__ = ["PARTS", "TRADES", "Bench", "BenchRequest", "bench", "bench_time_s", "compiler_note", "trade_lines"]
 
 TRADES = "What one more costs, and what it buys"
 _FIGURE, _RECORD = "figure-trade", "bench.json"

@@ -54,7 +54,7 @@ from analysis.report.terminal import Progress
 from device.limits import TRAIN_LIMITS
 from device.methods import Method, paper_methods
 from device.parameters import GunParameters
-from device.physics.batch import no_compiler
+from device.physics.batch import compiler_note, no_compiler
 from device.physics.equations import STATUSES
 from experiments.record import storage
 from experiments.record.provenance import provenance
@@ -130,7 +130,7 @@ def _simulated(
         return layers(space, rows, simulate_rows(rows, run, tell))
 
 
-__all__ = ["DesignRequest", "compiler_note", "design", "in_short", "search_time_s"]
+__all__ = ["DesignRequest", "design", "in_short", "search_time_s", "waiting_note"]
 
 _RECORD = "design.json"
 COLUMNS = (
@@ -169,11 +169,9 @@ def search_time_s(request: DesignRequest, workers: int | None) -> float:
     return _COMPILED_AROUND_S + _COMPILED_SHOT_S * shots
 
 
-def compiler_note() -> str:
+def waiting_note() -> str:
     """What to say before a search: how its shots are worked out."""
-    if why := no_compiler():
-        return f"note: interpreted, about three milliseconds a shot; compiled it takes a tenth of one, and {why}"
-    return "note: compiled, which takes about a minute the first time on a machine and a second or two later on"
+    return compiler_note("about three milliseconds a shot; compiled it takes a tenth of one", "a minute")
 
 
 def readings(gun: GunParameters) -> dict[str, Method]:

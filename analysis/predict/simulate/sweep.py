@@ -31,7 +31,7 @@ from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress, how_long
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
-from device.physics.batch import no_compiler
+from device.physics.batch import compiler_note, no_compiler
 from device.physics.equations import STATUSES
 from experiments.config.door import ConfigError
 from experiments.record import storage
@@ -205,7 +205,7 @@ def sweep(request: SimulateRequest, gun: GunParameters, progress: Progress, tell
     check_place(path)
     interpreted = rows <= few_shots(gun, axes) or bool(no_compiler())
     if not interpreted or rows > FEW_SHOTS:
-        tell(waiting_note())
+        tell(compiler_note())
     if words := how_long(rows * (_INTERPRETED_S if interpreted else _COMPILED_S)):
         tell(words)
     origin = _origin(gun, fidelity, axes, rows)
@@ -244,13 +244,6 @@ def _shoot(
             arrays: dict[str, Any] = {axis.key: axis.values[place] for axis, place in zip(axes, places, strict=True)}
             yield arrays, shoot(**arrays)
             done(f"{end:,} of {rows:,}")
-
-
-def waiting_note() -> str:
-    """What to say before many shots: how long they take."""
-    if why := no_compiler():
-        return f"note: interpreted, about a millisecond a shot; compiled it takes microseconds, and {why}"
-    return "note: compiled, which takes about half a minute the first time on a machine and a second or two later on"
 
 
 def table_sections(found: Sweep) -> tuple[Section, ...]:
