@@ -13,7 +13,7 @@ from typing import TypeVar
 from device.machine_clock import machine_s
 from device.messages import said_by
 
-_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last: Ctrl+Break on Windows
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")  # the last two: Ctrl+\, Ctrl+Break on Windows
 INTERRUPTS = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
 """The signals that end a command in order; no system knows all of them."""
 AWAKE_S = 0.2

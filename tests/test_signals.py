@@ -23,7 +23,7 @@ def qt() -> None:
     application()
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
 def test_a_signal_is_told_by_its_name_and_the_handlers_from_before_come_back(name: str) -> None:
     number, told = getattr(signal, name), list[str]()
     before = signal.getsignal(number)

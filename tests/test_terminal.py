@@ -293,6 +293,16 @@ def bodies(folder: Path, kind: str) -> list[dict[str, Any]]:
     return [one["body"] for one in journal_of(folder) if one.get("body", {}).get("kind") == kind]
 
 
+@pytest.mark.parametrize("keys", ["\x03", "\x1c"], ids=["Ctrl+C", "Ctrl+backslash"])
+def test_the_keys_that_end_a_program_end_a_run_in_order(keys: str, quick_configs: Path, tmp_path: Path) -> None:
+    with AtTerminal(run(quick_configs, "direction", "--seed", 1), tmp_path) as screen:
+        screen.fire()
+        screen.wait_for("b = backward:")
+        screen.press(keys)
+        assert screen.end() == 130
+    assert len(bodies(tmp_path, "stopped")) == 1
+
+
 def test_what_is_typed_ahead_fires_nothing_and_answers_nothing(quick_configs: Path, tmp_path: Path) -> None:
     config = quick_configs / "direction.toml"
     config.write_text(config.read_text().replace("guard_s = 0.0", "guard_s = 5.0"))
