@@ -26,7 +26,9 @@ SceneOption = Annotated[
     str | None, typer.Option(help="Pick the cheapest model for a use: session, figure, sweep, percept.")
 ]
 NeedsOption = Annotated[list[str] | None, typer.Option(metavar="OUTPUT=ERROR", help="The same for a use of your own.")]
-TraceOption = Annotated[Path | None, typer.Option(help="Write the shot over time as CSV, and beside it what it was made with.")]
+TraceOption = Annotated[
+    Path | None, typer.Option(help="Write the shot over time as CSV, and beside it what it was made with.")
+]
 PlotOption = Annotated[Path | None, typer.Option(help="Write Figure 5's panels as PNG, SVG and PDF.")]
 AuditOption = Annotated[
     bool, typer.Option("--audit", help="Add the balance: where the shot's energy and momentum went.")
