@@ -64,7 +64,7 @@ def say(text: str) -> None:
 _LONG_S = 10.0
 
 
-def how_long(seconds: float) -> str:
+def takes_about(seconds: float) -> str:
     """Of what takes over ten seconds on a usual machine, about how long that is; empty for less."""
     about = f"{seconds / 60:.0f} minutes" if seconds > 100 else f"{10 * round(seconds / 10)} s"
     return f"this takes about {about}" if seconds > _LONG_S else ""
@@ -72,7 +72,7 @@ def how_long(seconds: float) -> str:
 
 def say_how_long(seconds: float) -> None:
     """Say it beforehand."""
-    if words := how_long(seconds):
+    if words := takes_about(seconds):
         say(f"recoil: {words}")
 
 

@@ -28,7 +28,7 @@ from analysis.predict.simulate.scene import ScenePick, picked, scene_section
 from analysis.predict.simulate.shot import PARAMETER_KINDS, check_own, header_of
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_json
-from analysis.report.terminal import Progress, how_long
+from analysis.report.terminal import Progress, takes_about
 from device.parameters import GunParameters
 from device.physics import FIDELITIES, ShotBatch, simulate_batch
 from device.physics.batch import compiler_note, no_compiler
@@ -206,7 +206,7 @@ def sweep(request: SimulateRequest, gun: GunParameters, progress: Progress, tell
     interpreted = rows <= few_shots(gun, axes) or bool(no_compiler())
     if not interpreted or rows > FEW_SHOTS:
         tell(compiler_note())
-    if words := how_long(rows * (_INTERPRETED_S if interpreted else _COMPILED_S)):
+    if words := takes_about(rows * (_INTERPRETED_S if interpreted else _COMPILED_S)):
         tell(words)
     origin = _origin(gun, fidelity, axes, rows)
     counts = np.zeros(len(STATUSES), dtype=np.int64)
