@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
+import statistics
 import subprocess
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -23,6 +25,7 @@ from tests.conftest import Soak
 from tests.random_guns import NUMBERS, TURNS, by_few, differences, drawn, shot_alone
 
 OLD = Path(os.environ["RECOIL_OLD"]) if os.environ.get("RECOIL_OLD") else None
+ROOT = Path(__file__).parent.parent
 pytestmark = [pytest.mark.soak, pytest.mark.skipif(OLD is None, reason="RECOIL_OLD names no older version")]
 SEED = 77
 EXACT = 1e-11
@@ -76,3 +79,36 @@ def test_random_guns_against_those_of_before(emf: Emf, decades: int, count: int,
         "stated",
         f"{2 * count:,} guns, each alone and compiled; moments of turning left out",
     )
+
+
+SLIPPING = json.loads((Path(__file__).parent / "golden" / "physics_far.json").read_text(encoding="utf-8"))["shots"][3]
+TIMED = """
+import json, statistics, sys, time
+from device.physics import GunParameters, simulate
+gun, taken = GunParameters(**json.loads(sys.argv[1])), []
+simulate(gun)
+for _ in range(3):
+    begun = time.process_time()
+    simulate(gun)
+    taken.append(time.process_time() - begun)
+print(statistics.median(taken))
+"""
+
+
+def interpreted_s(folder: Path) -> float:
+    """The CPU time of one shot of the gun that slips, by the version in a folder."""
+    words = [folder / ".venv" / "bin" / "python", "-c", TIMED, json.dumps(SLIPPING["gun"])]
+    return float(subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True).stdout)
+
+
+def test_the_gun_that_slips_takes_a_fiftieth(soak: Soak) -> None:
+    assert OLD is not None
+    taken = [(interpreted_s(ROOT), interpreted_s(OLD)) for _ in range(5)]
+    now_s, before_s = (statistics.median(one) for one in zip(*taken, strict=True))
+    soak(
+        f"interpreted, the gun of 1,773 slips beside {commit(OLD)}",
+        f"{1e3 * now_s:.0f} ms, was {1e3 * before_s:.0f} ms: {now_s / before_s:.4f} of it",
+        "50 ms where it was 2.5 s",
+        "CPU time, medians of 5 turns",
+    )
+    assert now_s < 0.02 * before_s

@@ -136,7 +136,7 @@ def break_away(p: Constants, s: ShotState, x: float) -> None:
 def read_slips(s: ShotState, w: StepSeries, left: float, width: float) -> float:
     """How far the slips of a stretch go, up to its end or the last one before the drive changes; `s` has their time."""
     gone, took, ahead, count = 0.0, 0.0, s.drive_until - s.time, 0
-    while count < _READ_A_STEP * MAX_WORK and gone < width:
+    while count < _READ_A_STEP * (MAX_WORK - w.work) and gone < width:
         place = 2.0 * gone / width - 1.0
         wait = chebyshev_at(w.waits, place)
         if took + wait >= ahead:
