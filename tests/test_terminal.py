@@ -300,7 +300,7 @@ def test_the_keys_that_end_a_program_end_a_run_in_order(keys: str, quick_configs
         screen.wait_for("b = backward:")
         screen.press(keys)
         assert screen.end() == 130
-    assert len(bodies(tmp_path, "stopped")) == 1
+    assert [one["kind"] for one in journal_of(tmp_path)].count("stopped") == 1
 
 
 def test_what_is_typed_ahead_fires_nothing_and_answers_nothing(quick_configs: Path, tmp_path: Path) -> None:
