@@ -1,7 +1,9 @@
 """Guns at random, and at the ends of what is allowed."""
 
 import dataclasses
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
@@ -50,6 +52,10 @@ SPREAD = {
     "pulse_s": (0.002, 0.02),
     "contact_depth_m": (1e-4, 1e-3),
 }
+FAR_SHOTS = json.loads((Path(__file__).parent / "golden" / "physics_far.json").read_text(encoding="utf-8"))["shots"]
+"""Guns far from the paper's with their numbers in fifty digits: three that creep, and one that sticks and slips."""
+SLIPPING = GunParameters(**FAR_SHOTS[3]["gun"])
+"""1,773 slips, each a part of the way that is left to where the drive no longer moves the magnet."""
 HALVINGS = 20
 NOISE = 2e-11  # relative: below it differences are rounding and tolerance, not the gun's
 

@@ -11,24 +11,8 @@ import pytest
 
 from device.physics import GunParameters, ShotSummary, shot, simulate, simulate_batch, slips
 from device.physics.equations import OVER, ShotResult, ShotState, StepSeries, pack
-from tests.extreme_guns import work
+from tests.extreme_guns import SLIPPING, work
 
-SLIPPING = GunParameters(
-    magnet_mass_kg=2.59e-4,
-    back_emf_V_s_m=1020.0,
-    resistance_ohm=0.584,
-    inductance_H=0.556,
-    motor_constant_N_A=1.2,
-    coil_reach_m=1.46e-4,
-    stiffness_N_m=27.4,
-    preload_length_m=20.1,
-    friction_N=0.0811,
-    voltage_V=2560.0,
-    pulse_s=0.185,
-    drive_off="open",
-    emf="reciprocal",
-)
-"""1,773 slips, each a part of the way that is left to where the drive no longer moves the magnet."""
 LONG = GunParameters(
     magnet_mass_kg=6.734e-4,
     back_emf_V_s_m=1.125,

@@ -4,19 +4,13 @@ Nor does one whose speed and current ring first, or that is held; and none is he
 """
 
 import dataclasses
-import json
-from pathlib import Path
 
 import pytest
 
 from device.physics import GunParameters, coil, segments, shot, simulate
 from device.physics.equations import DRIVE_CHANGE, FREE, HOME, NOT_HOME, TURN, ShotState, StepSeries, pack
 from device.physics.traces import energy_balance
-from tests.extreme_guns import work
-
-SHOTS = json.loads((Path(__file__).parent / "golden" / "physics_far.json").read_text(encoding="utf-8"))["shots"]
-CREEPING = SHOTS[:3]
-"""The fourth sticks and slips."""
+from tests.extreme_guns import FAR_SHOTS, work
 
 RINGING = {
     "printed": GunParameters(
@@ -67,7 +61,7 @@ HELD = GunParameters(
 )
 
 
-@pytest.mark.parametrize("row", SHOTS, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
+@pytest.mark.parametrize("row", FAR_SHOTS, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
 def test_it_agrees_with_fifty_digits(row):
     gun = GunParameters(**row["gun"])
     found, least = simulate(gun), 1e-15 * gun.stiffness_N_m * gun.preload_length_m  # of what cancels in a force
@@ -78,7 +72,7 @@ def test_it_agrees_with_fifty_digits(row):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("row", CREEPING, ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
+@pytest.mark.parametrize("row", FAR_SHOTS[:3], ids=lambda row: str(row["gun"]["magnet_mass_kg"]))
 @pytest.mark.parametrize("name", ["magnet_mass_kg", "inductance_H"])
 def test_the_work_does_not_grow_with_the_stiffness(row, name):
     gun = GunParameters(**row["gun"])

@@ -22,6 +22,7 @@ from device.physics.equations import STATUSES
 from tests.benchmarks.older import older_batch
 from tests.benchmarks.problem import OFF_STATES
 from tests.conftest import Soak
+from tests.extreme_guns import FAR_SHOTS
 from tests.random_guns import NUMBERS, TURNS, by_few, differences, drawn, shot_alone
 
 OLD = Path(os.environ["RECOIL_OLD"]) if os.environ.get("RECOIL_OLD") else None
@@ -81,7 +82,6 @@ def test_random_guns_against_those_of_before(emf: Emf, decades: int, count: int,
     )
 
 
-SLIPPING = json.loads((Path(__file__).parent / "golden" / "physics_far.json").read_text(encoding="utf-8"))["shots"][3]
 TIMED = """
 import json, statistics, sys, time
 from device.physics import GunParameters, simulate
@@ -97,7 +97,7 @@ print(statistics.median(taken))
 
 def interpreted_s(folder: Path) -> float:
     """The CPU time of one shot of the gun that slips, by the version in a folder."""
-    words = [folder / ".venv" / "bin" / "python", "-c", TIMED, json.dumps(SLIPPING["gun"])]
+    words = [folder / ".venv" / "bin" / "python", "-c", TIMED, json.dumps(FAR_SHOTS[3]["gun"])]
     return float(subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True).stdout)
 
 

@@ -3,8 +3,8 @@
     F = m d2x/dt2 = F_m - k (x + x_0) - F_f sign(dx/dt)   (1)
     F_m = (x_c - x)/x_c k_m i inside the coil, else 0     (2)
 
-The functions here and in `coil`, `polynomial`, `segments` and `shot` are handed the classes below if interpreted, and
-records with the same fields if compiled (`device.physics.batch`). Both give the same digits.
+The functions here and in `coil`, `polynomial`, `segments`, `series`, `shot` and `slips` are handed the classes below if
+interpreted, and records with the same fields if compiled (`device.physics.batch`). Both give the same digits.
 """
 
 from __future__ import annotations
