@@ -172,7 +172,7 @@ def test_a_course_that_is_given_up_before_the_shot_is_over_says_where(recoil, tm
     end_s = float(trace.read_text(encoding="utf-8").splitlines()[-1].partition(",")[0])
     up_to = f"up to {end_s:.4g} s, where it is more work than is done for a shot"
     assert f"Energy and momentum, full model, {up_to}" in done.stdout
-    assert f"--trace and --plot: {up_to}; the numbers are of the whole shot" in done.stderr
+    assert f"--trace and --plot: {up_to}; the numbers may reach further" in done.stderr
     assert "status                   home" in done.stdout
     assert f"followed to {end_s:.4g} s" in figure.with_suffix(".svg").read_text(encoding="utf-8")
 
@@ -201,3 +201,16 @@ def test_beside_a_trace_stands_what_it_was_made_with(method, recoil, tmp_path):
     parameters = load_gun(find("gun")).rendering(method)
     assert about["parameters"] == json.loads(json.dumps(asdict(parameters)))
     assert about["provenance"]["numpy"]
+
+
+@pytest.mark.parametrize("words", [("--trace",), ("--vary", "friction_N=0.2,0.3", "--table")])
+def test_what_somebody_else_has_beside_a_table_is_not_replaced(words, recoil, tmp_path):
+    notes = tmp_path / "t.csv.json"
+    for _ in range(2):  # what is ours is
+        assert recoil("simulate", *words, tmp_path / "t.csv").returncode == 0
+    notes.write_text("{}", encoding="utf-8")
+    (tmp_path / "t.csv").unlink()
+    done = recoil("simulate", *words, tmp_path / "t.csv")
+    assert (done.returncode, f"{words[-1]} {notes}: holds something else" in done.stderr) == (2, True)
+    assert notes.read_text(encoding="utf-8") == "{}"
+    assert not (tmp_path / "t.csv").exists()

@@ -64,7 +64,7 @@ def simulated(request: SimulateRequest, progress: Progress, tell: Callable[[str]
     followed = _write_shot(request, gun, stem, of)
     _tell_files(request, stem, tell)
     if followed and request.of_files:
-        tell(f"{' and '.join(request.of_files)}: {followed}; the numbers are of the whole shot")
+        tell(f"{' and '.join(request.of_files)}: {followed}; the numbers may reach further")
     _tell_model(request, found.fidelity, tell)
     return found
 

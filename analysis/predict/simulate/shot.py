@@ -203,6 +203,13 @@ def check_own(option: str, path: Path, is_ours: Callable[[Path], bool]) -> None:
         raise ConfigError(f"{option} {path}: holds something else, which is not replaced; name another file")
 
 
+def place_of_origin(option: str, path: Path) -> Path:
+    """Where, beside a table, stands what it was made with. `ConfigError`: something else is there."""
+    beside = path.with_name(f"{path.name}.json")
+    check_own(option, beside, lambda there: b'"provenance"' in there.read_bytes())
+    return beside
+
+
 def header_of(path: Path) -> str:
     """The first line of a CSV file; of what is none, some text."""
     return storage.first_line(path).decode("utf-8", "replace").strip()
@@ -249,9 +256,10 @@ def up_to(given_up_s: float | None) -> str:
 def _write_columns(path: Path, columns: Mapping[str, Sequence[float]], origin: TraceOrigin) -> None:
     """Columns of one length as CSV, and beside it where they come from; the folder is made if it is missing."""
     check_own("--trace", path, lambda there: header_of(there) == ",".join(columns))
+    beside = place_of_origin("--trace", path)
     storage.make_folder(path.parent)
     storage.write_whole(path, as_csv(columns, zip(*columns.values(), strict=True)))
-    storage.write_whole(path.with_name(f"{path.name}.json"), as_json(origin))
+    storage.write_whole(beside, as_json(origin))
 
 
 def sections(found: SimulatedShot) -> tuple[Section, ...]:

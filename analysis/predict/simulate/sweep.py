@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from analysis.predict.simulate.request import SimulateRequest
 from analysis.predict.simulate.scene import ScenePick, picked, scene_section
-from analysis.predict.simulate.shot import PARAMETER_KINDS, check_own, header_of
+from analysis.predict.simulate.shot import PARAMETER_KINDS, check_own, header_of, place_of_origin
 from analysis.report.section import Section
 from analysis.report.serial import OPTIONAL, as_json
 from analysis.report.terminal import Progress, takes_about
@@ -73,6 +73,8 @@ def check_place(path: Path) -> None:
     if path.is_dir():
         raise ConfigError(f"--table {path}: is a folder; name a file")
     check_own("--table", path, _is_own)
+    if path.suffix == ".csv":
+        place_of_origin("--table", path)
 
 
 def _is_own(path: Path) -> bool:
@@ -99,7 +101,7 @@ def opened(path: Path, keys: Mapping[str, type], origin: SweepOrigin) -> Iterato
             yield groups.add
             groups.flush()
     if is_csv:
-        storage.write_whole(path.with_name(f"{path.name}.json"), about + b"\n")
+        storage.write_whole(place_of_origin("--table", path), about + b"\n")
 
 
 class _Groups:
